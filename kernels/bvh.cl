@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+// The other accelerator: an 8-wide bounding volume hierarchy whose leaves are groups of at most 16 primitives, for
+// decomposition flights, optical depth and point density. Kept or dropped by measurement (docs/design.md).
+#include "medium.cl"
+
+/// Entry distances of the ray into the node's boxes; CLUME_INFINITY where it misses or enters beyond t_end.
+static float8 bvh_test(__global const BvhNode* node, float3 o, float3 inverse, float t_begin, float t_end) {
+    const float8 ax = (vload8(0, node->lo_x) - o.x) * inverse.x, bx = (vload8(0, node->hi_x) - o.x) * inverse.x;
+    const float8 ay = (vload8(0, node->lo_y) - o.y) * inverse.y, by = (vload8(0, node->hi_y) - o.y) * inverse.y;
+    const float8 az = (vload8(0, node->lo_z) - o.z) * inverse.z, bz = (vload8(0, node->hi_z) - o.z) * inverse.z;
+    float8 near = select(ax, bx, bx < ax), far = select(bx, ax, bx < ax);
+    const float8 ny = select(ay, by, by < ay), fy = select(by, ay, by < ay);
+    const float8 nz = select(az, bz, bz < az), fz = select(bz, az, bz < az);
+    near = select(near, ny, ny > near);
+    near = select(near, nz, nz > near);
+    near = select(near, (float8)t_begin, near < (float8)t_begin);
+    far = select(far, fy, fy < far);
+    far = select(far, fz, fz < far);
+    return select((float8)CLUME_INFINITY, near, (near <= far) & (near < (float8)t_end));
+}
+
+static float3 bvh_inverse(float3 d) {
+    return (float3)(rcp_s(copysign(max_s(fabs(d.x), 0x1p-60f), d.x)), rcp_s(copysign(max_s(fabs(d.y), 0x1p-60f), d.y)),
+                    rcp_s(copysign(max_s(fabs(d.z), 0x1p-60f), d.z)));
+}
+
+/// Pushes the node's children that the ray enters before t_end, nearest on top; returns the new stack height.
+static int bvh_push(__global const BvhNode* node, float8 entry, float t_end, uint* stack, float* distance, int height) {
+    const float* near = (const float*)&entry;
+    const int base = height;
+    for (int i = 0; i < BVH_ARITY; ++i) {
+        if (node->child[i] == BVH_NONE || !(near[i] < t_end)) continue;
+        int j = height++;
+        for (; j > base && distance[j - 1] < near[i]; --j) {
+            distance[j] = distance[j - 1];
+            stack[j] = stack[j - 1];
+        }
+        distance[j] = near[i];
+        stack[j] = node->child[i];
+    }
+    return height;
+}
+
+static void bvh_decompose(float3 o, float3 d, float t_begin, uint2 key, float* best, uint* primitive, uint* work, SCENE_ARGS) {
+    uint stack[CLUME_BVH_STACK];
+    float distance[CLUME_BVH_STACK];
+    const float3 inverse = bvh_inverse(d);
+    int height = bvh_push(nodes, bvh_test(nodes, o, inverse, t_begin, *best), *best, stack, distance, 0);
+    while (height > 0) {
+        height -= 1;
+        if (!(distance[height] < *best)) continue;
+        const uint child = stack[height];
+        if (child & BVH_LEAF) {
+            *work += 1;
+            group_decompose(child & ~BVH_LEAF, o, d, t_begin, -CLUME_INFINITY, CLUME_INFINITY, key, best, primitive, SCENE);
+        } else {
+            height = bvh_push(nodes + child, bvh_test(nodes + child, o, inverse, t_begin, *best), *best, stack, distance, height);
+        }
+    }
+}
+
+static ulong bvh_depth(float3 o, float3 d, float t_begin, float t_end, SCENE_ARGS) {
+    uint stack[CLUME_BVH_STACK];
+    const float3 inverse = bvh_inverse(d);
+    ulong depth = 0;
+    int height = 0;
+    uint node = 0;
+    for (;;) {
+        const float8 entry = bvh_test(nodes + node, o, inverse, t_begin, t_end);
+        const float* near = (const float*)&entry;
+        for (int i = 0; i < BVH_ARITY; ++i) {
+            const uint child = nodes[node].child[i];
+            if (child == BVH_NONE || !(near[i] < t_end)) continue;
+            if (child & BVH_LEAF)
+                depth += group_depth(child & ~BVH_LEAF, o, d, t_begin, t_end, -CLUME_INFINITY, CLUME_INFINITY, SCENE);
+            else
+                stack[height++] = child;
+        }
+        if (height == 0 || depth >= ((ulong)128 << 40)) return depth;
+        node = stack[--height];
+    }
+}
+
+static float bvh_density(float3 p, uint* primitive, float u, SCENE_ARGS) {
+    uint stack[CLUME_BVH_STACK];
+    float sum = 0.0f;
+    int height = 0;
+    uint node = 0;
+    for (;;) {
+        for (int i = 0; i < BVH_ARITY; ++i) {
+            __global const BvhNode* n = nodes + node;
+            const uint child = n->child[i];
+            if (child == BVH_NONE || !(p.x >= n->lo_x[i] && p.x <= n->hi_x[i] && p.y >= n->lo_y[i] && p.y <= n->hi_y[i] &&
+                                       p.z >= n->lo_z[i] && p.z <= n->hi_z[i]))
+                continue;
+            if (child & BVH_LEAF) {
+                const float part = groups_density(child & ~BVH_LEAF, 1, p, SCENE);
+                // Reservoir over the leaves: the newcomer wins with its share, u is stretched back to (0, 1).
+                if (part > 0.0f) {
+                    sum += part;
+                    const float share = divide_s(part, sum);
+                    if (u < share) {
+                        u = divide_s(u, share);
+                        *primitive = groups_pick(child & ~BVH_LEAF, 1, p, u * part, SCENE);
+                    } else {
+                        u = divide_s(u - share, max_s(1.0f - share, 0x1p-24f));
+                    }
+                }
+            } else {
+                stack[height++] = child;
+            }
+        }
+        if (height == 0) return sum;
+        node = stack[--height];
+    }
+}

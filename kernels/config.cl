@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+// What a program is specialised to: every -D with its default, and the vector types of the chosen width.
+// A vector of W primitives is `vfloat`; comparisons give `vint` masks, used through `vselect(a, b, mask)` = mask ? b : a.
+#include "layout.h"
+
+#pragma OPENCL FP_CONTRACT OFF
+
+#ifndef CLUME_WIDTH  // primitives per vector: 16, 8, 4 or 1
+#define CLUME_WIDTH 8
+#endif
+#ifndef CLUME_FAMILIES  // kernel families in the scene, FAMILY_* bits
+#define CLUME_FAMILIES (FAMILY_GAUSSIAN | FAMILY_EPANECHNIKOV | FAMILY_UNIFORM)
+#endif
+#ifndef CLUME_ONE_MEDIUM  // 1: a single medium (or media that differ in nothing a kernel looks at)
+#define CLUME_ONE_MEDIUM 0
+#endif
+#ifndef CLUME_PHASES  // phase functions in the scene, PHASE_* bits
+#define CLUME_PHASES (PHASE_ISOTROPIC | PHASE_HENYEY_GREENSTEIN | PHASE_RAYLEIGH)
+#endif
+#ifndef CLUME_UNIFORM_G  // 1: one g for all, in params
+#define CLUME_UNIFORM_G 0
+#endif
+#ifndef CLUME_UNIFORM_ALBEDO  // 1: one albedo for all, in params
+#define CLUME_UNIFORM_ALBEDO 0
+#endif
+#ifndef CLUME_EMISSION  // 0: nothing emits; 1: one emission, in params; 2: per primitive
+#define CLUME_EMISSION 2
+#endif
+#ifndef CLUME_LIGHTS  // light kinds in the scene, LIGHT_* bits
+#define CLUME_LIGHTS 127
+#endif
+#ifndef CLUME_NEE  // light kinds sampled by next-event estimation
+#define CLUME_NEE 126
+#endif
+#ifndef CLUME_HITS  // light kinds that count when a scattered path finds them
+#define CLUME_HITS 99
+#endif
+#ifndef CLUME_VISIBLE_BACKGROUND  // 1: some environment is visible to the camera
+#define CLUME_VISIBLE_BACKGROUND 1
+#endif
+#ifndef CLUME_CHANNELS  // 1: everything is grey, one channel is carried; 3: RGB
+#define CLUME_CHANNELS 3
+#endif
+#ifndef CLUME_DEPTH_LIMIT  // 1: params.max_depth holds; 0: no limit
+#define CLUME_DEPTH_LIMIT 1
+#endif
+#define STRATEGY_DECOMPOSITION 1
+#define STRATEGY_DELTA 2
+#define STRATEGY_MARCH 3
+#ifndef CLUME_STRATEGY
+#define CLUME_STRATEGY STRATEGY_DECOMPOSITION
+#endif
+#define ACCEL_CELLS 1
+#define ACCEL_BVH 2
+#ifndef CLUME_ACCEL
+#define CLUME_ACCEL ACCEL_CELLS
+#endif
+#ifndef CLUME_BVH_STACK  // entries; the host gives the deepest that this tree can need
+#define CLUME_BVH_STACK 256
+#endif
+#ifndef CLUME_LAUNCH_EVENTS  // flights a work-item does before it saves its state for the next launch
+#define CLUME_LAUNCH_EVENTS 65536
+#endif
+#ifndef CLUME_FLIGHT_DRAWS  // tentative collisions a null-collision flight does before it pauses
+#define CLUME_FLIGHT_DRAWS 65536
+#endif
+
+#define CLUME_PARTS (CLUME_GROUP_SIZE / CLUME_WIDTH)
+#define CLUME_PER_PRIMITIVE (!CLUME_UNIFORM_G || !CLUME_UNIFORM_ALBEDO || CLUME_EMISSION == 2 || \
+                             (!CLUME_ONE_MEDIUM && CLUME_PHASES != PHASE_ISOTROPIC))
+
+#define CONCAT_(a, b) a##b
+#define CONCAT(a, b) CONCAT_(a, b)
+
+#if CLUME_WIDTH == 1
+typedef float vfloat;
+typedef int vint;
+typedef uint vuint;
+#define vselect(a, b, mask) ((mask) ? (b) : (a))
+#define vany(mask) (mask)
+#define as_vint(x) as_int(x)
+#define as_vuint(x) as_uint(x)
+#define as_vfloat(x) as_float(x)
+#define vload_row(p) (*(p))
+#else
+typedef CONCAT(float, CLUME_WIDTH) vfloat;
+typedef CONCAT(int, CLUME_WIDTH) vint;
+typedef CONCAT(uint, CLUME_WIDTH) vuint;
+#define vselect(a, b, mask) select((a), (b), (mask))
+#define vany(mask) any(mask)
+#define as_vint(x) CONCAT(as_int, CLUME_WIDTH)(x)
+#define as_vuint(x) CONCAT(as_uint, CLUME_WIDTH)(x)
+#define as_vfloat(x) CONCAT(as_float, CLUME_WIDTH)(x)
+#define vload_row(p) (*(__global const vfloat*)(p))
+#endif
+
+#define CLUME_INFINITY 1e30f  // "never" along a ray; finite, so that sums and products of it stay ordered
+#define CLUME_PI 3.14159265f
+#define CLUME_INV_4PI 0.0795774715f
+#define CLUME_INV_2PI 0.159154943f

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+// Exact sums: samples become 128-bit fixed-point numbers with 64 fraction bits (truncated below), so that any order of
+// adding gives the same bits. Samples are non-negative; the host's film_scale brings the scene's radiance near 1.
+#include "config.cl"
+
+#if CLUME_CHANNELS == 1
+typedef float spectrum;
+#define to_spectrum(v) ((v).x)
+#define spectrum_max(s) (s)
+#define spectrum_sum(s) (s)
+#else
+typedef float3 spectrum;
+#define to_spectrum(v) ((v).xyz)
+#define spectrum_max(s) max_s((s).x, max_s((s).y, (s).z))
+#define spectrum_sum(s) ((s).x + (s).y + (s).z)
+#endif
+
+/// (lo, hi) += x, for 0 <= x < 2^61.
+static void film_add(ulong* sum, float x) {
+    const uint bits = as_uint(x);
+    const int exponent = (int)(bits >> 23);
+    const ulong mantissa = (ulong)((bits & 0x7fffffu) | 0x800000u);
+    const int shift = exponent - 86;  // 127 + 23 − 64
+    ulong lo, hi;
+    if (shift < 0) {
+        lo = shift > -24 ? mantissa >> -shift : 0;
+        hi = 0;
+    } else if (shift < 64) {
+        lo = mantissa << shift;
+        hi = shift > 40 ? mantissa >> (64 - shift) : 0;
+    } else {
+        lo = 0;
+        hi = mantissa << (shift - 64);
+    }
+    sum[0] += lo;
+    sum[1] += hi + (sum[0] < lo ? 1 : 0);
+}
+
+/// Adds one sample: per channel x and x². A sample that is not finite (or beyond 2^30) is counted and adds nothing.
+static void film_sample(ulong* sums, spectrum radiance, float scale) {
+    const float total = spectrum_sum(radiance) * scale;
+    if (total == 0.0f) return;
+    if (!(total > 0.0f && total < 0x1p30f)) {
+        sums[FILM_NONFINITE] += 1;
+        return;
+    }
+#if CLUME_CHANNELS == 1
+    const float x = radiance * scale;
+    film_add(sums, x);
+    film_add(sums + 2, x * x);
+#else
+    const float x[3] = {radiance.x * scale, radiance.y * scale, radiance.z * scale};
+    for (int c = 0; c < 3; ++c) {
+        if (!(x[c] > 0x1p-100f)) continue;
+        film_add(sums + 4 * c, x[c]);
+        film_add(sums + 4 * c + 2, x[c] * x[c]);
+    }
+#endif
+}

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+// The one header shared by the host and the kernels: buffers and structs, made of float, float4 and uint only.
+//
+// All lengths are normalised: the host recentres the scene and scales it by a power of two so that its radius is in [1, 2).
+//
+//   params   RenderParams            one
+//   groups   float[176]              per group of 16 primitives: 11 rows of 16 (CLUME_ROW_*), padded lanes far away with sigma 0
+//   group_medium uint                per group: index into media
+//   cells    uint                    root cells, x fastest, then blocks of 8 children; see CELL_* below
+//   leaves   CellLeaf                per non-empty cell
+//   nodes    BvhNode                 8-wide bounding volume hierarchy; leaves are groups
+//   media    MediumInfo              per medium
+//   shading  float4[2]               per primitive: albedo, g | emission, medium index (as_uint)
+//   lights   LightInfo               per light
+//   texels   float4                  environment images: radiance, unused
+//   alias    AliasEntry              one per texel, importance sampling
+//   pixels   uint                    film index (x + width * y) of each pixel that the batch renders
+//   states   PathState               per work-item, kept between launches
+//   sums     ulong[FILM_WORDS]       per work-item, 128-bit fixed point (film.cl)
+#ifndef CLUME_LAYOUT_H
+#define CLUME_LAYOUT_H
+
+#ifdef __cplusplus
+#include <cstdint>
+namespace clume::device {
+using uint = std::uint32_t;
+using ulong = std::uint64_t;
+struct alignas(16) float4 {
+    float x, y, z, w;
+};
+#endif
+
+#define CLUME_GROUP_SIZE 16
+#define CLUME_GROUP_ROWS 11
+#define CLUME_GROUP_FLOATS (CLUME_GROUP_SIZE * CLUME_GROUP_ROWS)
+// Rows: centre, upper triangle of the whitening W (row-major), peak extinction, primitive id (as_uint).
+#define CLUME_ROW_MU 0
+#define CLUME_ROW_W 3
+#define CLUME_ROW_SIGMA 9
+#define CLUME_ROW_ID 10
+#define CLUME_NO_PRIMITIVE 0xffffffffu
+
+// A cell entry: below CELL_EMPTY_MAX an empty cell, the number being the distance in root cells (Chebyshev) within which
+// all is empty; with CELL_INNER set, the index of a block of 8 children; else CELL_EMPTY_MAX + the leaf's index.
+#define CELL_EMPTY_MAX 64u
+#define CELL_INNER 0x80000000u
+
+#define FAMILY_GAUSSIAN 1u
+#define FAMILY_EPANECHNIKOV 2u
+#define FAMILY_UNIFORM 4u
+#define PHASE_ISOTROPIC 1u
+#define PHASE_HENYEY_GREENSTEIN 2u
+#define PHASE_RAYLEIGH 4u
+
+#define LIGHT_CONSTANT 1u
+#define LIGHT_ENVMAP 2u
+#define LIGHT_POINT 4u
+#define LIGHT_SPOT 8u
+#define LIGHT_DIRECTIONAL 16u
+#define LIGHT_SPHERE 32u
+#define LIGHT_RECTANGLE 64u
+
+#define BVH_ARITY 8
+#define BVH_LEAF 0x80000000u
+#define BVH_NONE 0xffffffffu
+
+// Words of a work-item's film sums: per channel Σx and Σx² (lo, hi), then alpha count, non-finite samples, bound violations.
+#define FILM_CHANNELS_MAX 3
+#define FILM_WORDS (4 * FILM_CHANNELS_MAX + 4)
+#define FILM_ALPHA (4 * FILM_CHANNELS_MAX)
+#define FILM_NONFINITE (4 * FILM_CHANNELS_MAX + 1)
+#define FILM_VIOLATIONS (4 * FILM_CHANNELS_MAX + 2)
+#define FILM_WORK (4 * FILM_CHANNELS_MAX + 3)
+
+typedef struct RenderParams {
+    // Camera: the point P = plane_c + (x − film_cx) plane_x + (y − film_cy) plane_y near the media; direction likewise.
+    float4 plane_c, plane_x, plane_y;
+    float4 dir_c, dir_x, dir_y;
+    float4 cells_origin;  // lower corner; w: 1 / root cell size
+    float4 bounds_min, bounds_max;
+    float4 albedo;    // uniform albedo; w: uniform g
+    float4 emission;  // uniform emission
+    float film_cx, film_cy, film_scale, march_step;
+    uint cells_x, cells_y, cells_z, cells_levels;
+    uint film_width, seed_lo, seed_hi, light_count;
+    int max_depth, rr_depth;
+    uint pad0, pad1;
+} RenderParams;
+
+typedef struct CellLeaf {
+    uint first_group, group_count;
+    float majorant, inverse_majorant;
+} CellLeaf;
+
+typedef struct BvhNode {
+    float lo_x[BVH_ARITY], lo_y[BVH_ARITY], lo_z[BVH_ARITY];
+    float hi_x[BVH_ARITY], hi_y[BVH_ARITY], hi_z[BVH_ARITY];
+    uint child[BVH_ARITY];  // BVH_LEAF | group, node index, or BVH_NONE
+} BvhNode;
+
+typedef struct MediumInfo {
+    uint family, phase;
+    float extent_squared, g;
+} MediumInfo;
+
+typedef struct LightInfo {
+    uint kind, visible, width, height;  // visible: to the camera
+    uint texel_offset, pad0, pad1;
+    float select_pdf;  // of being chosen for next-event estimation; 0: never
+    float4 radiance;   // radiance, intensity or irradiance; w: cumulative selection probability
+    float4 position;   // position, centre, corner or direction; w: radius, or rectangle area
+    float4 axis;       // spot direction, rectangle normal, environment's sin and cos of rotate_y in x, y; w: spot cutoff angle
+    float4 edge_u, edge_v;  // rectangle; spot: edge_u.x = 1 / (cutoff − beam)
+    float4 dual_u, dual_v;  // rectangle: edge_u · dual_u = 1, edge_v · dual_u = 0 and the other way round
+} LightInfo;
+
+typedef struct AliasEntry {
+    uint threshold, other;
+    float pdf_texel, pad0;  // probability of the texel / its solid angle [1/sr]
+} AliasEntry;
+
+typedef struct PathState {
+    float4 origin;     // w: t reached in the present flight
+    float4 direction;  // w: pdf of the phase sampling that made it
+    float4 beta;
+    float4 radiance;
+    uint sample, depth, draw, flags;  // sample: the next one if no path is alive
+} PathState;
+
+#ifdef __cplusplus
+static_assert(sizeof(RenderParams) == 240 && sizeof(CellLeaf) == 16 && sizeof(BvhNode) == 224 && sizeof(MediumInfo) == 16);
+static_assert(sizeof(LightInfo) == 144 && sizeof(AliasEntry) == 16 && sizeof(PathState) == 80);
+}  // namespace clume::device
+#endif
+
+#endif

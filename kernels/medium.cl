@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+// What every strategy needs of the medium: the kernels' common arguments, a group's family, the density of a list of groups,
+// which primitive a collision belongs to, and one group's part in a decomposition flight or in a sum of optical depths.
+#include "cells.cl"
+
+#define SCENE_ARGS                                                                                                    \
+    __constant const RenderParams *params, __global const uint *cells, __global const CellLeaf *leaves,               \
+        __global const BvhNode *nodes, __global const float *groups, __global const uint *group_medium,               \
+        __global const MediumInfo *media, __global const float4 *shading, __global const LightInfo *lights,           \
+        __global const float4 *texels, __global const AliasEntry *alias
+#define SCENE params, cells, leaves, nodes, groups, group_medium, media, shading, lights, texels, alias
+
+// With one medium, family and extent are constants of the program.
+#if CLUME_ONE_MEDIUM
+#ifndef CLUME_EXTENT_SQUARED
+#define CLUME_EXTENT_SQUARED 9.0f
+#endif
+#define group_family(g) ((uint)CLUME_FAMILIES)
+#define group_extent_squared(g) CLUME_EXTENT_SQUARED
+#else
+#define group_family(g) media[group_medium[g]].family
+#define group_extent_squared(g) media[group_medium[g]].extent_squared
+#endif
+
+/// Random numbers of one scattering event of one sample.
+typedef struct {
+    uint sample, pixel, depth;
+    uint2 seed;
+} Draws;
+
+static uint4 draw_bits(const Draws* r, uint draw) { return philox((uint4)(r->sample, r->pixel, r->depth, draw), r->seed); }
+
+#define FLIGHT_ESCAPED 0
+#define FLIGHT_COLLIDED 1
+#define FLIGHT_PAUSED 2
+
+/// A flight under way or ended: t reached, draws used, the primitive it collided with (if CLUME_PER_PRIMITIVE), and how often
+/// the density exceeded its bound; `work` counts groups evaluated.
+typedef struct {
+    float t;
+    uint draw, primitive, violations, work;
+} Flight;
+
+/// Extinction at p of the groups [first, first + count): lanes add up over the groups, then by fixed pairs.
+static float groups_density(uint first, uint count, float3 p, SCENE_ARGS) {
+    vfloat sum[CLUME_PARTS];
+    for (int k = 0; k < CLUME_PARTS; ++k) sum[k] = (vfloat)0.0f;
+    for (uint g = first; g < first + count; ++g) {
+        const uint family = group_family(g);
+        const float e2 = group_extent_squared(g);
+        __global const float* part = groups + (size_t)g * CLUME_GROUP_FLOATS;
+        for (int k = 0; k < CLUME_PARTS; ++k) sum[k] += density_part(part + k * CLUME_WIDTH, p, family, e2);
+    }
+    return reduce_lanes(sum);
+}
+
+/// The primitive whose share of the density at p holds `target` (uniform below the density): found by adding them in order.
+static uint groups_pick(uint first, uint count, float3 p, float target, SCENE_ARGS) {
+    uint last = CLUME_NO_PRIMITIVE;
+    float sum = 0.0f;
+    for (uint g = first; g < first + count; ++g) {
+        __global const float* part = groups + (size_t)g * CLUME_GROUP_FLOATS;
+        for (int k = 0; k < CLUME_PARTS; ++k) {
+            const vfloat density = density_part(part + k * CLUME_WIDTH, p, group_family(g), group_extent_squared(g));
+            const float* lane = (const float*)&density;
+            for (int i = 0; i < CLUME_WIDTH; ++i) {
+                if (!(lane[i] > 0.0f)) continue;
+                sum += lane[i];
+                last = as_uint(part[16 * CLUME_ROW_ID + k * CLUME_WIDTH + i]);
+                if (sum > target) return last;
+            }
+        }
+    }
+    return last;
+}
+
+/// Lets each primitive of group g whose chord begins (after t_begin) in [lower, upper) draw its own collision, and keeps the
+/// earliest in *best, ties by the smaller id [Kutz17, Theorem 1].
+static void group_decompose(uint g, float3 o, float3 d, float t_begin, float lower, float upper, uint2 key, float* best, uint* primitive, SCENE_ARGS) {
+    const uint family = group_family(g);
+    const float e2 = group_extent_squared(g);
+    for (int k = 0; k < CLUME_PARTS; ++k) {
+        __global const float* part = groups + (size_t)g * CLUME_GROUP_FLOATS + k * CLUME_WIDTH;
+        Chord c;
+        vint mask = intersect(part, o, d, e2, &c);
+        const vfloat start = vselect(c.t_in, (vfloat)t_begin, c.t_in < (vfloat)t_begin);
+        mask &= (c.t_out > (vfloat)t_begin) & (start >= (vfloat)lower) & (start < (vfloat)upper) & (start < (vfloat)*best);
+        if (!vany(mask)) continue;
+        const vuint id = as_vuint(vload_row(part + 16 * CLUME_ROW_ID));
+        const vfloat tau = exponential_v(primitive_bits(id, key));
+        vfloat t = flight_part(&c, vload_row(part + 16 * CLUME_ROW_SIGMA), start, tau, family, e2);
+        t = vselect((vfloat)CLUME_INFINITY, t, mask);
+        if (!vany(t <= (vfloat)*best)) continue;
+        const float* lane = (const float*)&t;
+        for (int i = 0; i < CLUME_WIDTH; ++i) {
+            const uint lane_id = as_uint(part[16 * CLUME_ROW_ID + i]);
+            if (lane[i] < *best || (lane[i] == *best && lane_id < *primitive)) {
+                *best = lane[i];
+                *primitive = lane_id;
+            }
+        }
+    }
+}
+
+/// Optical depth between t_begin and t_end of the primitives of group g whose chord begins in [lower, upper): fixed point,
+/// 40 fraction bits, clamped to 2^8.
+static ulong group_depth(uint g, float3 o, float3 d, float t_begin, float t_end, float lower, float upper, SCENE_ARGS) {
+    const uint family = group_family(g);
+    const float e2 = group_extent_squared(g);
+    vfloat sum[CLUME_PARTS];
+    int found = 0;
+    for (int k = 0; k < CLUME_PARTS; ++k) {
+        __global const float* part = groups + (size_t)g * CLUME_GROUP_FLOATS + k * CLUME_WIDTH;
+        Chord c;
+        vint mask = intersect(part, o, d, e2, &c);
+        const vfloat start = vselect(c.t_in, (vfloat)t_begin, c.t_in < (vfloat)t_begin);
+        const vfloat stop = vselect(c.t_out, (vfloat)t_end, c.t_out > (vfloat)t_end);
+        mask &= (start < stop) & (start >= (vfloat)lower) & (start < (vfloat)upper);
+        sum[k] = (vfloat)0.0f;
+        if (!vany(mask)) continue;
+        found = 1;
+        const vfloat depth = depth_part(&c, vload_row(part + 16 * CLUME_ROW_SIGMA), start, vselect(start, stop, mask), family, e2);
+        sum[k] = vselect((vfloat)0.0f, depth, mask);
+    }
+    if (!found) return 0;
+    return convert_ulong_rtz(min_s(reduce_lanes(sum), 256.0f) * 0x1p40f);
+}
+
+/// e^(−depth) of a fixed-point sum; 0 from 2^7 on.
+static float depth_transmittance(ulong depth) {
+    return depth >= ((ulong)128 << 40) ? 0.0f : exp_s(-convert_float_rte(depth) * 0x1p-40f);
+}

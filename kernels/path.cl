@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+// One path, event by event: a flight to the next collision or surface, emission there, roulette, next-event estimation with
+// MIS (balance heuristic), scattering. A path lives in PathState between launches.
+#include "camera.cl"
+#include "light.cl"
+
+#define PATH_ALIVE 1u
+#define PATH_ALPHA 2u  // the camera ray met something
+
+typedef struct {
+    float3 o, d;
+    float phase_pdf;
+    spectrum beta, radiance;
+    uint sample, depth, flags;
+    Flight flight;
+} Path;
+
+static void path_begin(Path* p, uint pixel, uint sample, __constant const RenderParams* params) {
+    const Draws r = {sample, pixel, 0, (uint2)(params->seed_lo, params->seed_hi)};
+    const uint4 bits = draw_bits(&r, DRAW_CAMERA);
+    camera_ray(params, pixel % params->film_width, pixel / params->film_width, uniform_s(bits.x), uniform_s(bits.y), &p->o, &p->d);
+    p->phase_pdf = 0.0f;
+    p->beta = (spectrum)1.0f;
+    p->radiance = (spectrum)0.0f;
+    p->sample = sample;
+    p->depth = 0;
+    p->flags = PATH_ALIVE;
+    p->flight.t = 0.0f;
+    p->flight.draw = 0;
+}
+
+/// Albedo, emission and phase function at a collision with `primitive`.
+static void collision_properties(uint primitive, spectrum* albedo, spectrum* emission, uint* phase, float* g, SCENE_ARGS) {
+    *albedo = to_spectrum(params->albedo);
+    *emission = to_spectrum(params->emission);
+    *g = params->albedo.w;
+    *phase = CLUME_PHASES;
+#if CLUME_PER_PRIMITIVE
+    const float4 a = shading[2 * (size_t)primitive];
+#if !CLUME_UNIFORM_ALBEDO
+    *albedo = to_spectrum(a);
+#endif
+#if !CLUME_UNIFORM_G
+    *g = a.w;
+#endif
+#if CLUME_EMISSION == 2 || !CLUME_ONE_MEDIUM
+    const float4 e = shading[2 * (size_t)primitive + 1];
+#if CLUME_EMISSION == 2
+    *emission = to_spectrum(e);
+#endif
+#if !CLUME_ONE_MEDIUM
+    *phase = media[as_uint(e.w)].phase;
+#endif
+#endif
+#endif
+}
+
+/// What a light adds at x for a path that came along d, before beta.
+static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws* r, SCENE_ARGS) {
+#if CLUME_NEE
+    LightSample s;
+#if CLUME_NEE & LIGHT_ENVMAP
+    const uint4 more = draw_bits(r, DRAW_LIGHT_MORE);
+#else
+    const uint4 more = (uint4)0u;
+#endif
+    if (!light_sample(x, draw_bits(r, DRAW_LIGHT), more, &s, params, lights, texels, alias)) return (spectrum)0.0f;
+    uint blocker;
+    surfaces_nearest(x, s.direction, s.distance, s.light, &blocker, params, lights);
+    if (blocker != NO_LIGHT) return (spectrum)0.0f;
+    const float value = phase_value(phase, g, dot_s(d, s.direction));
+    const float weight = (lights[s.light].kind & CLUME_HITS) ? divide_s(s.pdf, s.pdf + value) : 1.0f;
+    return s.value * (value * weight * transmittance_analytic(x, s.direction, s.distance, SCENE));
+#else
+    return (spectrum)0.0f;
+#endif
+}
+
+/// One event; afterwards the path is alive, paused in its flight (still alive), or ended with its radiance complete.
+static void path_event(Path* p, uint pixel, SCENE_ARGS) {
+    const Draws r = {p->sample, pixel, p->depth, (uint2)(params->seed_lo, params->seed_hi)};
+    uint surface;
+    const float t_end = surfaces_nearest(p->o, p->d, CLUME_INFINITY, NO_LIGHT, &surface, params, lights);
+    const int result = flight_sample(p->o, p->d, t_end, &p->flight, &r, SCENE);
+    if (result == FLIGHT_PAUSED) return;
+    if (result == FLIGHT_ESCAPED) {
+        p->flags &= ~PATH_ALIVE;
+        if (surface == NO_LIGHT) {
+#if LIGHT_ENVIRONMENTS && ((CLUME_LIGHTS & CLUME_HITS) || CLUME_VISIBLE_BACKGROUND)
+            p->radiance += p->beta * environment_radiance(p->d, p->phase_pdf, p->depth == 0, params, lights, texels, alias);
+#endif
+            return;
+        }
+#if LIGHT_SURFACES
+        if (p->depth == 0) p->flags |= PATH_ALPHA;
+        const uint kind = lights[surface].kind;
+        if ((p->depth == 0 || (kind & CLUME_HITS)) && surface_emits(surface, p->o, p->d, lights)) {
+            const float other = p->depth > 0 && (kind & CLUME_NEE) ? surface_pdf(surface, p->o, p->d, t_end, lights) : 0.0f;
+            const float weight = p->depth > 0 ? divide_s(p->phase_pdf, p->phase_pdf + other) : 1.0f;
+            p->radiance += p->beta * to_spectrum(lights[surface].radiance) * weight;
+        }
+#endif
+        return;
+    }
+    if (p->depth == 0) p->flags |= PATH_ALPHA;
+    spectrum albedo, emission;
+    uint phase;
+    float g;
+    collision_properties(p->flight.primitive, &albedo, &emission, &phase, &g, SCENE);
+#if CLUME_EMISSION
+    p->radiance += p->beta * ((spectrum)1.0f - albedo) * emission;
+#endif
+#if CLUME_DEPTH_LIMIT
+    if ((int)p->depth == params->max_depth) {
+        p->flags &= ~PATH_ALIVE;
+        return;
+    }
+#endif
+    p->beta *= albedo;
+    const float most = spectrum_max(p->beta);
+    if (!(most > 0.0f)) {
+        p->flags &= ~PATH_ALIVE;
+        return;
+    }
+    if ((int)p->depth >= params->rr_depth && most < 1.0f) {
+        if (uniform_s(draw_bits(&r, DRAW_ROULETTE).x) >= most) {
+            p->flags &= ~PATH_ALIVE;
+            return;
+        }
+        p->beta *= rcp_s(most);
+    }
+    const float3 x = along_s(p->o, p->d, p->flight.t);
+#if CLUME_NEE
+    p->radiance += p->beta * path_light(x, p->d, phase, g, &r, SCENE);
+#endif
+    p->d = phase_sample(phase, g, p->d, draw_bits(&r, DRAW_PHASE), &p->phase_pdf);
+    p->o = x;
+    p->depth += 1;
+    p->flight.t = 0.0f;
+    p->flight.draw = 0;
+}

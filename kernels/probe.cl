@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// Entry points that run one building block each over arrays: for the tests and the benchmarks.
+// The same code as in `render`, under the same defines.
+#include "path.cl"
+#include "self_test.cl"
+
+/// out[i] = philox(counter[i], key[i].xy).
+__kernel void probe_philox(__global const uint4* counter, __global const uint4* key, __global uint4* out, uint count) {
+    const uint i = (uint)get_global_id(0);
+    if (i < count) out[i] = philox(counter[i], key[i].xy);
+}
+
+/// Bits per primitive id under a key, ids first + [0, count), count a multiple of CLUME_WIDTH.
+__kernel void probe_primitive_bits(uint first, uint2 key, __global uint* out, uint count) {
+    const uint base = (uint)get_global_id(0) * CLUME_WIDTH;
+    if (base >= count) return;
+    vuint id;
+    uint* lane = (uint*)&id;
+    for (int i = 0; i < CLUME_WIDTH; ++i) lane[i] = first + base + (uint)i;
+    const vuint bits = primitive_bits(id, key);
+    for (int i = 0; i < CLUME_WIDTH; ++i) out[base + i] = ((const uint*)&bits)[i];
+}
+
+/// One ray against one group (16 primitives): per lane d2, t_in, t_out, density at along(o, d, t0), depth between t0 and t1
+/// clipped to the chord, and the free flight from t0 for optical depth tau. quadratic != 0: rows hold Σ⁻¹.
+/// rays: float4 origin with t0, float4 direction with t1, float4 tau and unused.
+__kernel void probe_group(__global const float* groups, __global const float4* rays, __global float* out, uint count, uint family, float e2, uint quadratic) {
+    const uint i = (uint)get_global_id(0);
+    if (i >= count) return;
+    const float3 o = rays[3 * i].xyz, d = rays[3 * i + 1].xyz;
+    const float t0 = rays[3 * i].w, t1 = rays[3 * i + 1].w, tau = rays[3 * i + 2].x;
+    for (int k = 0; k < CLUME_PARTS; ++k) {
+        __global const float* part = groups + (size_t)i * CLUME_GROUP_FLOATS + k * CLUME_WIDTH;
+        Chord c;
+        const vint hit = quadratic ? intersect_quadratic(part, o, d, e2, &c) : intersect(part, o, d, e2, &c);
+        const vfloat start = vselect(c.t_in, (vfloat)t0, c.t_in < (vfloat)t0), stop = vselect(c.t_out, (vfloat)t1, c.t_out > (vfloat)t1);
+        const vint inside = hit & (start < stop);
+        const vfloat sigma = vload_row(part + 16 * CLUME_ROW_SIGMA), none = (vfloat)0.0f;
+        vfloat r[6];
+        r[0] = c.d2;
+        r[1] = vselect((vfloat)CLUME_INFINITY, c.t_in, hit);
+        r[2] = vselect((vfloat)CLUME_INFINITY, c.t_out, hit);
+        r[3] = density_part(part, along_s(o, d, t0), family, e2);
+        r[4] = vselect(none, depth_part(&c, sigma, start, vselect(start, stop, inside), family, e2), inside);
+        r[5] = vselect((vfloat)CLUME_INFINITY, flight_part(&c, sigma, start, (vfloat)tau, family, e2), inside);
+        for (int q = 0; q < 6; ++q)
+            for (int lane = 0; lane < CLUME_WIDTH; ++lane) out[((size_t)i * 6 + (size_t)q) * 16 + (size_t)(k * CLUME_WIDTH + lane)] = ((const float*)&r[q])[lane];
+    }
+}
+
+/// Ray i: free flight by the program's strategy up to t_end (in the origin's w): out t (CLUME_INFINITY if it escapes),
+/// primitive (as_uint), transmittance to t_end, groups evaluated (as_uint). what: 1 flight, 2 transmittance, 3 both.
+__kernel void probe_ray(SCENE_ARGS, __global const float4* origin, __global const float4* direction, __global float4* out, uint count, uint sample, uint what) {
+    const uint i = (uint)get_global_id(0);
+    if (i >= count) return;
+    const float3 o = origin[i].xyz, d = direction[i].xyz;
+    const float t_end = origin[i].w;
+    float4 r = (float4)(CLUME_INFINITY, as_float(CLUME_NO_PRIMITIVE), 1.0f, 0.0f);
+    if (what & 1u) {
+        Draws draws = {sample, i, 1, (uint2)(params->seed_lo, params->seed_hi)};
+        Flight f = {0.0f, 0, CLUME_NO_PRIMITIVE, 0, 0};
+        int result;
+        do result = flight_sample(o, d, t_end, &f, &draws, SCENE);
+        while (result == FLIGHT_PAUSED);
+        if (result == FLIGHT_COLLIDED) {
+            r.x = f.t;
+            r.y = as_float(f.primitive);
+        }
+        r.w = as_float(f.work);
+    }
+    if (what & 2u) r.z = transmittance_analytic(o, d, t_end, SCENE);
+    out[i] = r;
+}
+
+/// Camera rays of whole pixels' samples: origin and direction.
+__kernel void probe_camera(SCENE_ARGS, __global const uint* pixels, __global float4* origin, __global float4* direction, uint count, uint sample) {
+    const uint i = (uint)get_global_id(0);
+    if (i >= count) return;
+    Path p;
+    path_begin(&p, pixels[i], sample, params);
+    origin[i] = (float4)(p.o, CLUME_INFINITY);
+    direction[i] = (float4)(p.d, 0.0f);
+}
+
+/// Phase function i: in: g, cosine to evaluate, unused; out: value at the cosine, then a sampled direction's cosine, its pdf.
+__kernel void probe_phase(uint kind, float g, float3 d, uint seed, __global float4* out, uint count) {
+    const uint i = (uint)get_global_id(0);
+    if (i >= count) return;
+    const uint4 bits = philox((uint4)(i, 0, 0, 0), (uint2)(seed, 1));
+    float pdf;
+    const float3 s = phase_sample(kind, g, d, bits, &pdf);
+    out[i] = (float4)(dot_s(s, d), pdf, phase_value(kind, g, dot_s(s, d)), dot_s(s, s));
+}

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// Random numbers as a pure function of (seed, pixel, sample, depth, draw[, primitive]): no state, so that the image does not
+// depend on devices, batches or traversal order. Philox4x32 with 7 rounds [Salmon11, doi 10.1145/2063384.2063405]; the tests
+// compare it with Random123's. Per-primitive bits come from a keyed 32-bit mixer, one multiply-xorshift chain per vector.
+#include "math.cl"
+
+// Draw numbers: flights count up from 0; the others have their own block each.
+#define DRAW_PHASE 0xf0000000u
+#define DRAW_LIGHT 0xf0000001u
+#define DRAW_CAMERA 0xf0000002u
+#define DRAW_ROULETTE 0xf0000003u
+#define DRAW_LIGHT_MORE 0xf0000004u
+
+/// 128 random bits; counter = (sample, pixel, depth, draw), key = seed.
+static uint4 philox(uint4 c, uint2 k) {
+    for (int round = 0; round < 7; ++round) {
+        const uint lo0 = c.x * 0xD2511F53u, hi0 = mul_hi(c.x, 0xD2511F53u);
+        const uint lo1 = c.z * 0xCD9E8D57u, hi1 = mul_hi(c.z, 0xCD9E8D57u);
+        c = (uint4)(hi1 ^ c.y ^ k.x, lo1, hi0 ^ c.w ^ k.y, lo0);
+        k += (uint2)(0x9E3779B9u, 0xBB67AE85u);
+    }
+    return c;
+}
+
+/// Uniform in (0, 1): (x + 1/2) 2^-32 rounded to float, kept below 1.
+static float uniform_s(uint x) { return min_s((from_uint_s(x) + 0.5f) * 0x1p-32f, 0x1.fffffep-1f); }
+
+/// 32 random bits per primitive id under a 64-bit key: a bijective mixer (three multiply-xorshift rounds).
+static vuint primitive_bits(vuint id, uint2 key) {
+    vuint x = id * (vuint)0x9E3779B9u ^ (vuint)key.x;
+    x = (x ^ (x >> (vuint)16)) * (vuint)0x7feb352du;
+    x = (x ^ (x >> (vuint)15)) * (vuint)0x846ca68bu + (vuint)key.y;
+    x = (x ^ (x >> (vuint)16)) * (vuint)0x9e485565u;
+    return x ^ (x >> (vuint)15);
+}

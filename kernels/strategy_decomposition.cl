@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// `decomposition`: every primitive draws its own optical depth and inverts it in closed form; the smallest t wins, and the
+// winner is the primitive collided with [Kutz17, Theorem 1, doi 10.1145/3072959.3073665]. Exact, no sort, no root finding.
+#include "bvh.cl"
+
+static int flight_decomposition(float3 o, float3 d, float t_end, Flight* f, const Draws* r, SCENE_ARGS) {
+    const uint2 key = draw_bits(r, 0).xy;
+    float best = t_end;
+    uint primitive = CLUME_NO_PRIMITIVE;
+#if CLUME_ACCEL == ACCEL_CELLS
+    CellWalk w;
+    if (cells_enter(&w, o, d, 0.0f, t_end, params, cells)) {
+        float lower = -CLUME_INFINITY;
+        do {
+            if (w.entry >= CELL_EMPTY_MAX) {
+                const CellLeaf leaf = leaves[w.entry - CELL_EMPTY_MAX];
+                for (uint g = leaf.first_group; g < leaf.first_group + leaf.group_count; ++g)
+                    group_decompose(g, o, d, 0.0f, lower, w.t_exit, key, &best, &primitive, SCENE);
+                f->work += leaf.group_count;
+            }
+            lower = w.t_exit;
+        } while (best > w.t_exit && cells_next(&w, params, cells));
+    }
+#else
+    bvh_decompose(o, d, 0.0f, key, &best, &primitive, &f->work, SCENE);
+#endif
+    if (primitive == CLUME_NO_PRIMITIVE) return FLIGHT_ESCAPED;
+    f->t = best;
+    f->primitive = primitive;
+    return FLIGHT_COLLIDED;
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// `march`: fixed steps from the ray's origin, the extinction of a step's middle held constant over it. The simplest
+// baseline, biased by the step. Empty cells are skipped a whole number of steps at a time.
+#include "bvh.cl"
+
+static int flight_march(float3 o, float3 d, float t_end, Flight* f, const Draws* r, SCENE_ARGS) {
+    const float step = params->march_step;
+    const uint4 bits = draw_bits(r, 0);
+    float tau = exponential_s(bits.x);
+#if CLUME_ACCEL == ACCEL_CELLS
+    CellWalk w;
+    if (!cells_enter(&w, o, d, 0.0f, t_end, params, cells)) return FLIGHT_ESCAPED;
+    const float last = w.t_end;
+    float k = floor(divide_s(w.t, step));  // steps before this one; exact up to 2^24
+#else
+    const float3 inverse = bvh_inverse(d);
+    const float3 a = ((float3)(params->bounds_min.x, params->bounds_min.y, params->bounds_min.z) - o) * inverse;
+    const float3 b = ((float3)(params->bounds_max.x, params->bounds_max.y, params->bounds_max.z) - o) * inverse;
+    const float first = max_s(0.0f, max_s(min_s(a.x, b.x), max_s(min_s(a.y, b.y), min_s(a.z, b.z))));
+    const float last = min_s(t_end, min_s(max_s(a.x, b.x), min_s(max_s(a.y, b.y), max_s(a.z, b.z))));
+    if (!(first < last)) return FLIGHT_ESCAPED;
+    float k = floor(divide_s(first, step));
+#endif
+    for (;;) {
+        const float begin = k * step, middle = fma(0.5f, step, begin);
+        if (!(begin < last)) return FLIGHT_ESCAPED;
+#if CLUME_ACCEL == ACCEL_CELLS
+        while (w.t_exit <= middle)
+            if (!cells_next(&w, params, cells)) return FLIGHT_ESCAPED;
+        if (w.entry < CELL_EMPTY_MAX) {
+            k = max_s(k + 1.0f, floor(divide_s(w.t_exit, step) - 0.5f));
+            continue;
+        }
+        const CellLeaf leaf = leaves[w.entry - CELL_EMPTY_MAX];
+        const float3 p = along_s(o, d, middle);
+        const float sigma = groups_density(leaf.first_group, leaf.group_count, p, SCENE);
+        f->work += leaf.group_count;
+#else
+        const float3 p = along_s(o, d, middle);
+        const float sigma = bvh_density(p, &f->primitive, uniform_s(bits.y), SCENE);
+#endif
+        const float available = sigma * min_s(step, t_end - begin);
+        if (tau < available) {
+#if CLUME_ACCEL == ACCEL_CELLS && CLUME_PER_PRIMITIVE
+            f->primitive = groups_pick(leaf.first_group, leaf.group_count, p, uniform_s(bits.y) * sigma, SCENE);
+#endif
+            f->t = min_s(fma(tau, rcp_s(sigma), begin), t_end);
+            return FLIGHT_COLLIDED;
+        }
+        tau -= available;
+        k += 1.0f;
+    }
+}

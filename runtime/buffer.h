@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+// A typed array on one device, released with its owner. Transfers are blocking and in order with the queue's kernels.
+// An empty buffer is allowed (a scene without lights still passes a lights buffer): it holds one unused element.
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "runtime/check.h"
+#include "runtime/queue.h"
+
+namespace clume {
+
+template <class T>
+class Buffer {
+    static_assert(std::is_trivially_copyable_v<T>);
+
+public:
+    /// Holds nothing; only assignment and destruction are allowed.
+    Buffer() = default;
+    /// `count` elements of undefined content.
+    Buffer(const Queue& queue, std::size_t count, cl_mem_flags flags = CL_MEM_READ_WRITE)
+        : queue_(queue.queue()),
+          label_(queue.label()),
+          size_(count),
+          memory_(queue.allocate((count ? count : 1) * sizeof(T), flags)) {}
+    /// A copy of `data`, read-only to kernels unless said otherwise.
+    Buffer(const Queue& queue, std::span<const T> data, cl_mem_flags flags = CL_MEM_READ_ONLY)
+        : Buffer(queue, data.size(), flags) {
+        upload(data);
+    }
+    Buffer(const Queue& queue, const std::vector<T>& data, cl_mem_flags flags = CL_MEM_READ_ONLY)
+        : Buffer(queue, std::span<const T>(data), flags) {}
+    Buffer(Buffer&&) noexcept = default;
+    Buffer& operator=(Buffer&&) noexcept = default;
+
+    std::size_t size() const { return size_; }                   ///< elements
+    std::size_t byte_size() const { return size_ * sizeof(T); }  ///< 0 for an empty buffer
+    const cl::Buffer& memory() const { return memory_; }
+
+    /// Elements [first, first + data.size()) become `data`, which may be reused on return.
+    void upload(std::span<const T> data, std::size_t first = 0) {
+        assert(first + data.size() <= size_);
+        if (data.empty()) return;
+        checked(label_, [&] {
+            queue_.enqueueWriteBuffer(memory_, CL_TRUE, first * sizeof(T), data.size_bytes(), data.data());
+        });
+    }
+
+    /// `out` becomes elements [first, first + out.size()); waits for what was enqueued before.
+    void download(std::span<T> out, std::size_t first = 0) const {
+        assert(first + out.size() <= size_);
+        if (out.empty()) return;
+        checked(label_, [&] {
+            queue_.enqueueReadBuffer(memory_, CL_TRUE, first * sizeof(T), out.size_bytes(), out.data());
+        });
+    }
+
+    std::vector<T> download() const {
+        std::vector<T> out(size_);
+        download(std::span<T>(out));
+        return out;
+    }
+
+    /// Every element becomes `value`; enqueued, returns at once.
+    void fill(const T& value) {
+        static_assert(sizeof(T) <= 128 && (sizeof(T) & (sizeof(T) - 1)) == 0, "OpenCL fills powers of two up to 128 bytes");
+        if (size_ > 0) checked(label_, [&] { queue_.enqueueFillBuffer(memory_, value, 0, byte_size()); });
+    }
+
+    /// Every byte becomes 0; enqueued, returns at once.
+    void zero() {
+        using Word = std::conditional_t<sizeof(T) % 16 == 0, cl_uint4, std::conditional_t<sizeof(T) % 4 == 0, cl_uint, cl_uchar>>;
+        const Word nothing{};
+        if (size_ > 0) checked(label_, [&] { queue_.enqueueFillBuffer(memory_, nothing, 0, byte_size()); });
+    }
+
+private:
+    cl::CommandQueue queue_;
+    std::string label_;
+    std::size_t size_ = 0;
+    cl::Buffer memory_;
+};
+
+}  // namespace clume

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+// The threads around BatchPlan: one lock guards plan and report, workers run outside it. A worker without work waits
+// until all is done, since another's failure may give it some.
+#include "runtime/dispatcher.h"
+
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "runtime/batch_plan.h"
+#include "runtime/error.h"
+
+namespace clume {
+
+Worker::~Worker() = default;
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+class Dispatch {
+public:
+    Dispatch(const std::vector<std::unique_ptr<Worker>>& workers, const DispatchOptions& options)
+        : workers_(workers), options_(options), plan_(options, workers.size()), alive_(workers.size()) {
+        for (const auto& worker : workers) report_.workers.emplace_back().name = worker->name();
+        report_.units_of_item.resize(options.items);
+        if (options.end > options.begin) report_.units_total = std::uint64_t(options.items) * (options.end - options.begin);
+    }
+
+    DispatchReport run() {
+        std::vector<std::thread> threads;
+        try {
+            for (std::size_t w = 0; w < workers_.size(); ++w) threads.emplace_back([this, w] { serve(w); });
+            report_progress();
+        } catch (...) {
+            end_with(std::current_exception());
+        }
+        for (std::thread& thread : threads) thread.join();
+        if (error_) std::rethrow_exception(error_);
+        report_.elapsed_s = seconds_since(start_);
+        report_.gaps = plan_.unredone();
+        report_.stopped = stopping_ && report_.units_done < report_.units_total;
+        report_.failed = !stopping_ && report_.units_done < report_.units_total;
+        if (options_.progress) options_.progress(progress());
+        return std::move(report_);
+    }
+
+private:
+    bool ended() const { return stopping_ || alive_ == 0 || (plan_.exhausted() && under_way_ == 0); }
+
+    void end_with(std::exception_ptr error) {
+        const std::lock_guard lock(mutex_);
+        if (!error_) error_ = std::move(error);
+        stopping_ = true;
+        changed_.notify_all();
+    }
+
+    /// Calls `progress` from the caller's thread until nothing is left to do and every batch has come back.
+    void report_progress() {
+        std::unique_lock lock(mutex_);
+        while (!(ended() && under_way_ == 0)) {
+            changed_.wait_for(lock, std::chrono::milliseconds(200), [&] { return ended() && under_way_ == 0; });
+            if (!options_.progress || seconds_since(reported_) < 0.19) continue;
+            reported_ = Clock::now();
+            const DispatchProgress state = progress();
+            lock.unlock();
+            options_.progress(state);
+            lock.lock();
+        }
+    }
+
+    DispatchProgress progress() const {
+        const bool all = report_.units_done == report_.units_total;
+        return {report_.units_done, report_.units_total, seconds_since(start_), all ? 0 : plan_.seconds_left()};
+    }
+
+    /// A worker's thread.
+    void serve(std::size_t w) try {
+        std::unique_lock lock(mutex_);
+        while (!ended()) {
+            if (!plan_.exhausted() && options_.stop && options_.stop()) {
+                stopping_ = true;
+                break;
+            }
+            const std::optional<Batch> batch = plan_.next(w);
+            if (!batch) {
+                changed_.wait(lock);
+                continue;
+            }
+            ++under_way_;
+            lock.unlock();
+            std::string failure;
+            std::exception_ptr other;
+            const Clock::time_point start = Clock::now();
+            try {
+                workers_[w]->run(*batch);
+            } catch (const DeviceError& error) {
+                failure = error.what();
+                if (failure.empty()) failure = "unknown failure";
+            } catch (...) {
+                other = std::current_exception();
+            }
+            const double seconds = seconds_since(start);
+            lock.lock();
+            --under_way_;
+            WorkerReport& own = report_.workers[w];
+            own.busy_s += seconds;
+            if (other) std::rethrow_exception(other);
+            if (!failure.empty()) {
+                drop(w, *batch, failure);
+                return;
+            }
+            plan_.done(w, *batch, seconds);
+            const std::uint32_t units = batch->end - batch->begin;
+            own.units += units;
+            ++own.batches;
+            report_.units_done += units;
+            report_.units_of_item[batch->item] += units;
+            changed_.notify_all();
+        }
+        changed_.notify_all();
+    } catch (...) {
+        end_with(std::current_exception());
+    }
+
+    void drop(std::size_t w, const Batch& batch, const std::string& failure) {
+        plan_.failed(w, batch);
+        --alive_;
+        report_.workers[w].dropped = true;
+        report_.workers[w].error = failure;
+        report_.warnings.push_back("device " + report_.workers[w].name + " failed and was dropped: " + failure);
+        changed_.notify_all();
+    }
+
+    const std::vector<std::unique_ptr<Worker>>& workers_;
+    const DispatchOptions& options_;
+    const Clock::time_point start_ = Clock::now();
+    Clock::time_point reported_ = start_;
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    BatchPlan plan_;
+    DispatchReport report_;
+    std::exception_ptr error_;
+    std::size_t alive_;
+    std::size_t under_way_ = 0;
+    bool stopping_ = false;
+};
+
+}  // namespace
+
+DispatchReport dispatch(const std::vector<std::unique_ptr<Worker>>& workers, const DispatchOptions& options) {
+    return Dispatch(workers, options).run();
+}
+
+}  // namespace clume

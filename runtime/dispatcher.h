@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// Shares out work over workers, one thread each. The work is a grid: `items` × a half-open range of units; a batch is some
+// units of one item. Items advance together, pass by pass, so that whenever it stops all hold about the same number of
+// units. Nothing is said about order: what a batch yields must add up the same in any.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace clume {
+
+/// Units [begin, end) of one item, begin < end.
+struct Batch {
+    std::uint32_t item = 0;
+    std::uint32_t begin = 0, end = 0;
+};
+
+/// What does batches, called from its own thread only, one batch at a time.
+class Worker {
+public:
+    virtual ~Worker();
+    virtual std::string name() const = 0;
+    /// Blocks until done. All or nothing: results are committed at the end. Throws DeviceError if the device failed: then
+    /// the batch is given to another worker and this one gets no more. Any other exception ends the dispatch. Warm up
+    /// (compile) before dispatching, since batches are sized by how long they take.
+    virtual void run(const Batch& batch) = 0;
+};
+
+struct DispatchProgress {
+    std::uint64_t units_done = 0, units_total = 0;  ///< over all items
+    double elapsed_s = 0;
+    double remaining_s = -1;  ///< expected from measured costs; −1: not known yet
+};
+
+struct DispatchOptions {
+    std::uint32_t items = 0;
+    std::uint32_t begin = 0, end = 0;      ///< units of every item
+    std::uint32_t fixed_chunk = 0;         ///< units per batch; 0: by measurement
+    double target_seconds = 0.15;          ///< per batch; well under a display driver's watchdog
+    std::function<bool()> stop;            ///< asked before each batch, one thread at a time; true: start no more
+    std::function<void(const DispatchProgress&)> progress;  ///< called by dispatch's caller's thread, every 0.2 s and at the end
+};
+
+struct WorkerReport {
+    std::string name;
+    std::uint64_t units = 0;
+    std::uint64_t batches = 0;
+    double busy_s = 0;     ///< inside run(), failed batches included
+    bool dropped = false;
+    std::string error;     ///< why it was dropped
+};
+
+struct DispatchReport {
+    bool failed = false;   ///< no worker was left and work was
+    bool stopped = false;  ///< by `stop`, before the end
+    std::uint64_t units_done = 0, units_total = 0;
+    double elapsed_s = 0;
+    std::vector<WorkerReport> workers;         ///< in the order given
+    std::vector<std::uint32_t> units_of_item;  ///< done: the first units of the range, the item's `gaps` left out
+    std::vector<Batch> gaps;                   ///< held by a dropped worker and not redone
+    std::vector<std::string> warnings;         ///< one per dropped worker
+};
+
+/// Runs until all is done, `stop` says so, or no worker is left. What isn't a DeviceError (from a worker, `stop` or
+/// `progress`) is thrown again here once every thread has ended its batch.
+DispatchReport dispatch(const std::vector<std::unique_ptr<Worker>>& workers, const DispatchOptions& options);
+
+}  // namespace clume

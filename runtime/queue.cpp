@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// Context, queue and launches of one device; cl::Error leaves as DeviceError.
+#include "runtime/queue.h"
+
+#include <utility>
+
+#include "runtime/check.h"
+
+namespace clume {
+
+namespace {
+
+/// A failed launch names its kernel; the padded size is reported since it's what the device saw.
+cl::Event start(const cl::CommandQueue& queue, const std::string& label, const cl::Kernel& kernel, std::size_t global,
+                std::size_t local) {
+    const std::size_t padded = local ? (global + local - 1) / local * local : global;
+    try {
+        cl::Event event;
+        queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(padded), local ? cl::NDRange(local) : cl::NullRange,
+                                   nullptr, &event);
+        return event;
+    } catch (const cl::Error& error) {
+        cl_int status = CL_SUCCESS;
+        const std::string name = kernel() ? kernel.getInfo<CL_KERNEL_FUNCTION_NAME>(&status) : std::string("no kernel");
+        throw_device_error(error, label,
+                           "kernel " + name + ", " + std::to_string(padded) + " work-items by " + std::to_string(local));
+    }
+}
+
+}  // namespace
+
+Queue::Queue(DeviceInfo info) : info_(std::move(info)), label_(info_.label()) {
+    checked(label_, [&] {
+        context_ = cl::Context(info_.device);
+        queue_ = cl::CommandQueue(context_, info_.device, CL_QUEUE_PROFILING_ENABLE);
+    });
+}
+
+void Queue::enqueue(const cl::Kernel& kernel, std::size_t global, std::size_t local) {
+    if (global > 0) start(queue_, label_, kernel, global, local);
+}
+
+double Queue::launch(const cl::Kernel& kernel, std::size_t global, std::size_t local) {
+    if (global == 0) return 0;
+    const cl::Event event = start(queue_, label_, kernel, global, local);
+    return checked(label_, [&] {
+        event.wait();
+        const cl_ulong begin = event.getProfilingInfo<CL_PROFILING_COMMAND_START>();
+        const cl_ulong end = event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
+        return end > begin ? static_cast<double>(end - begin) * 1e-9 : 0.0;
+    });
+}
+
+void Queue::flush() {
+    checked(label_, [&] { queue_.flush(); });
+}
+
+void Queue::finish() {
+    checked(label_, [&] { queue_.finish(); });
+}
+
+cl::Buffer Queue::allocate(std::size_t byte_size, cl_mem_flags flags) const {
+    try {
+        return cl::Buffer(context_, flags, byte_size);
+    } catch (const cl::Error& error) {
+        throw_device_error(error, label_,
+                           std::to_string(byte_size) + " bytes asked for, the device gives at most " +
+                               std::to_string(info_.max_allocation) + " at once of " + std::to_string(info_.global_memory));
+    }
+}
+
+}  // namespace clume

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: MIT
+#include "src/cells.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "src/parallel.h"
+
+namespace clume {
+namespace {
+
+constexpr std::uint32_t kMaxLevels = 8;
+constexpr std::size_t kMaxRoots = std::size_t{1} << 22;
+
+struct Cost {
+    const CellCosts& c;
+    /// Per unit of length travelled inside a cubic cell of edge `size` (mean chord 2/3 size).
+    double operator()(double size, std::size_t primitives, double majorant) const {
+        const double groups = std::ceil(static_cast<double>(primitives) / CLUME_GROUP_SIZE);
+        const double visits = 1.5 / size;
+        const double null = visits * c.step + majorant * (c.tentative + groups * c.density);
+        const double chord = visits * (c.step + groups * c.chord);
+        return c.null_share * null + c.chord_share * chord;
+    }
+};
+
+struct List {
+    std::vector<std::uint32_t> primitives;
+    double majorant = 0;
+};
+
+/// The primitives among `candidates` that meet the box, and their bound.
+template <class Candidates>
+List list_of(std::span<const Ellipsoid> ellipsoids, const Candidates& candidates, const Box& box) {
+    List list;
+    for (const std::uint32_t i : candidates) {
+        const double bound = box_extinction(ellipsoids[i], box);
+        if (!(bound > 0)) continue;
+        list.primitives.push_back(i);
+        list.majorant += bound;
+    }
+    return list;
+}
+
+Box octant(const Box& box, int k) {
+    const glm::dvec3 middle = 0.5 * (box.lo + box.hi);
+    Box b;
+    for (int axis = 0; axis < 3; ++axis) {
+        b.lo[axis] = (k >> axis) & 1 ? middle[axis] : box.lo[axis];
+        b.hi[axis] = (k >> axis) & 1 ? box.hi[axis] : middle[axis];
+    }
+    return b;
+}
+
+/// One root cell's octree, entries relative to its own arrays.
+struct Subtree {
+    std::vector<std::uint32_t> blocks;  ///< children, 8 a block; inner entries index blocks / 8
+    std::vector<Cells::Leaf> leaves;
+    std::uint32_t root = 1;             ///< entry
+    std::uint32_t depth = 0;
+};
+
+struct Refiner {
+    std::span<const Ellipsoid> ellipsoids;
+    Cost cost;
+    const CellCosts& costs;
+    double allowance;  ///< how much the references of a cell may grow by a split
+    std::uint32_t max_levels;
+
+    std::uint32_t leaf(Subtree& out, List&& list) const {
+        if (list.primitives.empty()) return 1;
+        out.leaves.push_back({std::move(list.primitives), list.majorant});
+        return CELL_EMPTY_MAX + static_cast<std::uint32_t>(out.leaves.size() - 1);
+    }
+
+    std::uint32_t refine(Subtree& out, const Box& box, List&& list, std::uint32_t level) const {
+        const double size = box.hi.x - box.lo.x;
+        const std::size_t n = list.primitives.size();
+        const double groups = std::ceil(static_cast<double>(n) / CLUME_GROUP_SIZE);
+        out.depth = std::max(out.depth, level);
+        // Nothing to gain where crossing the cell costs little more than entering it.
+        const double evaluation = costs.null_share * list.majorant * size * (costs.tentative + groups * costs.density) +
+                                  costs.chord_share * groups * costs.chord;
+        if (n == 0 || level == max_levels || evaluation < costs.step || (n <= 4 && list.majorant * size < 1)) return leaf(out, std::move(list));
+        List children[8];
+        double majorant = 0, child_cost = 0;
+        std::size_t references = 0;
+        for (int k = 0; k < 8; ++k) {
+            children[k] = list_of(ellipsoids, list.primitives, octant(box, k));
+            majorant = std::max(majorant, children[k].majorant);
+            references += children[k].primitives.size();
+            child_cost += cost(0.5 * size, children[k].primitives.size(), children[k].majorant) / 8;
+        }
+        list.majorant = std::min(list.majorant, majorant);
+        const double own = cost(size, n, list.majorant);
+        const bool crowded = n > 64 * CLUME_GROUP_SIZE && references < 4 * n;
+        if (!crowded && (child_cost > 0.92 * own || static_cast<double>(references) > allowance * static_cast<double>(n)))
+            return leaf(out, std::move(list));
+        const std::size_t block = out.blocks.size() / 8;
+        out.blocks.resize(out.blocks.size() + 8);
+        for (int k = 0; k < 8; ++k) {
+            const std::uint32_t entry = refine(out, octant(box, k), std::move(children[k]), level + 1);
+            out.blocks[8 * block + static_cast<std::size_t>(k)] = entry;
+        }
+        return CELL_INNER | static_cast<std::uint32_t>(block);
+    }
+};
+
+/// Root cell size of least cost at points where the media are, given the most references allowed.
+double choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const Cost& cost, const glm::dvec3& extent, std::size_t max_references) {
+    const double longest = std::max({extent.x, extent.y, extent.z});
+    const std::size_t n = ellipsoids.size();
+    const std::size_t stride = std::max<std::size_t>(1, n / 20000), samples = std::min<std::size_t>(n, 192);
+    double best_size = longest, best_cost = std::numeric_limits<double>::max();
+    for (double size = longest; size > longest / 1500; size *= 0.84) {
+        const glm::dvec3 counts = glm::ceil(extent / size);
+        if (counts.x * counts.y * counts.z > static_cast<double>(kMaxRoots)) break;
+        double references = 0;
+        for (std::size_t i = 0; i < n; i += stride) {
+            const glm::dvec3 h = 2.0 * ellipsoids[i].half / size;
+            references += (h.x + 1) * (h.y + 1) * (h.z + 1);
+        }
+        // Boxes overcount ellipsoids by about their volume ratio.
+        references *= 0.6 * static_cast<double>(stride);
+        if (references > static_cast<double>(max_references) && size < longest) break;
+        double total = 0;
+        parallel_chunks(1, 1, [&](std::size_t, std::size_t) {
+            for (std::size_t s = 0; s < samples; ++s) {
+                const Ellipsoid& e = ellipsoids[s * n / samples];
+                // A point inside the support, by a fixed low-discrepancy sequence.
+                const double u = static_cast<double>(s);
+                const glm::dvec3 r(std::fmod(u * 0.8191725134, 1.0), std::fmod(u * 0.6710436067, 1.0), std::fmod(u * 0.5497004779, 1.0));
+                const glm::dvec3 p = e.center + 0.6 * (2.0 * r - 1.0) * e.half;
+                const glm::dvec3 lo = glm::floor(p / size) * size;
+                const Box box{lo, lo + size};
+                std::size_t count = 0;
+                double majorant = 0;
+                tree.overlapping(ellipsoids, box, [&](std::uint32_t i) {
+                    const double bound = box_extinction(ellipsoids[i], box);
+                    if (bound > 0) ++count, majorant += bound;
+                });
+                total += cost(size, count, majorant);
+            }
+        });
+        // Duplicates cost memory and cache: a logarithmic price beyond a cache's worth of references.
+        total *= 1 + 0.05 * std::log2(1 + references / 65536);
+        if (total < best_cost) best_cost = total, best_size = size;
+        if (total > 3 * best_cost) break;
+    }
+    return best_size;
+}
+
+/// For each empty root, the Chebyshev distance to the nearest root that is not empty (or lies outside), capped.
+void measure_emptiness(Cells& cells) {
+    const glm::ivec3 n(cells.roots);
+    const auto at = [&](int x, int y, int z) -> std::uint32_t& {
+        return cells.table[static_cast<std::size_t>(x) + static_cast<std::size_t>(n.x) * (static_cast<std::size_t>(y) + static_cast<std::size_t>(n.y) * static_cast<std::size_t>(z))];
+    };
+    // Two sweeps of the 26-neighbour distance transform; beyond the grid counts as empty.
+    const auto sweep = [&](int direction) {
+        const auto order = [&](int count, int k) { return direction > 0 ? k : count - 1 - k; };
+        for (int c = 0; c < n.z; ++c)
+            for (int b = 0; b < n.y; ++b)
+                for (int a = 0; a < n.x; ++a) {
+                    const int x = order(n.x, a), y = order(n.y, b), z = order(n.z, c);
+                    std::uint32_t& entry = at(x, y, z);
+                    if (entry >= CELL_EMPTY_MAX) continue;
+                    std::uint32_t least = CELL_EMPTY_MAX - 2;
+                    for (int k = 0; k < 13; ++k) {
+                        const int dx = k % 3 - 1, dy = k / 3 % 3 - 1, dz = k / 9 - 1;
+                        const int i = x + direction * dx, j = y + direction * dy, l = z + direction * dz;
+                        if (i < 0 || j < 0 || l < 0 || i >= n.x || j >= n.y || l >= n.z) continue;
+                        const std::uint32_t other = at(i, j, l);
+                        least = std::min(least, other < CELL_EMPTY_MAX ? other : 0);
+                    }
+                    entry = std::min(direction > 0 ? CELL_EMPTY_MAX - 1 : entry, least + 1);
+                }
+    };
+    sweep(1);
+    sweep(-1);
+}
+
+}  // namespace
+
+Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const CellCosts& costs, std::size_t max_references) {
+    Cells cells;
+    cells.table = {1};
+    if (ellipsoids.empty()) return cells;
+    const Box bounds = bounds_of(ellipsoids);
+    const double margin = 1e-4 * glm::length(bounds.hi - bounds.lo);
+    cells.origin = glm::dvec3(glm::vec3(bounds.lo - margin));
+    const glm::dvec3 extent = bounds.hi + margin - cells.origin;
+    const Cost cost{costs};
+    // The device works with the float of 1 / size: use exactly that here.
+    const double size = choose_root_size(ellipsoids, tree, cost, extent, max_references);
+    cells.root_size = 1.0 / static_cast<double>(static_cast<float>(1.0 / size));
+    cells.roots = glm::uvec3(glm::max(glm::ceil(extent / cells.root_size), 1.0));
+    const std::size_t roots = static_cast<std::size_t>(cells.roots.x) * cells.roots.y * cells.roots.z;
+
+    // Which boxes of primitives meet which roots: counted, then filled, in primitive order.
+    const auto range = [&](std::uint32_t i, glm::ivec3& lo, glm::ivec3& hi) {
+        const Ellipsoid& e = ellipsoids[i];
+        const glm::ivec3 last = glm::ivec3(cells.roots) - 1;
+        lo = glm::clamp(glm::ivec3(glm::floor((e.center - e.half - cells.origin) / cells.root_size)), glm::ivec3(0), last);
+        hi = glm::clamp(glm::ivec3(glm::floor((e.center + e.half - cells.origin) / cells.root_size)), glm::ivec3(0), last);
+    };
+    std::vector<std::uint64_t> offset(roots + 1, 0);
+    const auto n = static_cast<std::uint32_t>(ellipsoids.size());
+    const auto visit = [&](auto&& f) {
+        for (std::uint32_t i = 0; i < n; ++i) {
+            glm::ivec3 lo, hi;
+            range(i, lo, hi);
+            for (int z = lo.z; z <= hi.z; ++z)
+                for (int y = lo.y; y <= hi.y; ++y)
+                    for (int x = lo.x; x <= hi.x; ++x)
+                        f(i, static_cast<std::size_t>(x) + static_cast<std::size_t>(cells.roots.x) * (static_cast<std::size_t>(y) + static_cast<std::size_t>(cells.roots.y) * static_cast<std::size_t>(z)));
+        }
+    };
+    visit([&](std::uint32_t, std::size_t root) { ++offset[root + 1]; });
+    for (std::size_t r = 0; r < roots; ++r) offset[r + 1] += offset[r];
+    std::vector<std::uint32_t> candidates(offset[roots]);
+    {
+        std::vector<std::uint64_t> cursor(offset.begin(), offset.end() - 1);
+        visit([&](std::uint32_t i, std::size_t root) { candidates[cursor[root]++] = i; });
+    }
+
+    // As deep as integers at the finest level stay exact in float.
+    std::uint32_t max_levels = kMaxLevels;
+    while (max_levels > 0 && (static_cast<std::uint64_t>(std::max({cells.roots.x, cells.roots.y, cells.roots.z})) << max_levels) > (1u << 22)) --max_levels;
+    const double spare = static_cast<double>(max_references) / std::max(1.0, 0.6 * static_cast<double>(candidates.size()));
+    const Refiner refiner{ellipsoids, cost, costs, std::clamp(2.0 * spare, 1.5, 8.0), max_levels};
+    std::vector<Subtree> subtrees(roots);
+    parallel_chunks(roots, 64, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t r = begin; r < end; ++r) {
+            const glm::dvec3 at(r % cells.roots.x, r / cells.roots.x % cells.roots.y, r / cells.roots.x / cells.roots.y);
+            const Box box{cells.origin + at * cells.root_size, cells.origin + (at + 1.0) * cells.root_size};
+            List list = list_of(ellipsoids, std::span(candidates).subspan(offset[r], offset[r + 1] - offset[r]), box);
+            if (!list.primitives.empty()) subtrees[r].root = refiner.refine(subtrees[r], box, std::move(list), 0);
+        }
+    });
+
+    // One table: roots, then all blocks; leaves in the order of their roots.
+    for (const auto& s : subtrees) cells.levels = std::max(cells.levels, s.depth);
+    cells.table.assign(roots, 1);
+    const auto place = [&](std::uint32_t entry, std::size_t first_block, std::size_t first_leaf) -> std::uint32_t {
+        if (entry & CELL_INNER) return CELL_INNER | static_cast<std::uint32_t>(roots + 8 * ((entry & ~CELL_INNER) + first_block));
+        return entry < CELL_EMPTY_MAX ? entry : entry + static_cast<std::uint32_t>(first_leaf);
+    };
+    std::size_t blocks = 0;
+    for (std::size_t r = 0; r < roots; ++r) {
+        Subtree& s = subtrees[r];
+        cells.table[r] = place(s.root, blocks, cells.leaves.size());
+        const std::size_t first_leaf = cells.leaves.size();
+        for (const std::uint32_t entry : s.blocks) cells.table.push_back(place(entry, blocks, first_leaf));
+        for (auto& leaf : s.leaves) {
+            cells.references += leaf.primitives.size();
+            cells.leaves.push_back(std::move(leaf));
+        }
+        blocks += s.blocks.size() / 8;
+        s = {};
+    }
+    measure_emptiness(cells);
+    return cells;
+}
+
+}  // namespace clume

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: MIT
+// Command line parsing with CLI11. Its own checks of unknown arguments are off: what it does not know is collected and
+// reported here in one line with the nearest name, and all its errors become UsageError.
+#include "src/cli.h"
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "src/error.h"
+#include "src/scene_schema.h"
+
+namespace clume {
+
+namespace {
+
+struct KeyFlag {
+    const char* flag;
+    const char* key;
+    const char* value;
+    const char* help;
+};
+
+/// Flags that are another way to say -D; the scene reader checks their values.
+constexpr std::array key_flags{
+    KeyFlag{"--spp", "render.spp", "N", "samples per pixel"},
+    KeyFlag{"--seed", "render.seed", "S", "seed of the random numbers"},
+    KeyFlag{"--max-depth", "render.max_depth", "N", "most scattering events on a path; -1: no limit"},
+    KeyFlag{"--strategy", "render.strategy", "NAME", "distance sampling"},
+    KeyFlag{"--transmittance", "render.transmittance", "NAME", "transmittance estimator"},
+};
+
+constexpr const char* overview =
+    "clume renders mixtures of ellipsoids (smoke, fire, clouds) by path tracing, on any OpenCL device.\n";
+constexpr const char* exit_codes =
+    "Exit codes: 0 done, 1 render failed, 2 wrong command line, 3 wrong scene or asset, 4 no such device, 130 interrupted.";
+
+/// What the strings of `render` are parsed into before they are checked.
+struct RenderTexts {
+    std::string scene, output, sample_range, crop, stats_json;
+    std::vector<std::string> definitions, devices;
+    std::optional<double> time_limit_s;
+    std::optional<int> cpu_split;
+};
+
+/// `text` as numbers with `separator` between them; false unless there are exactly `count` of them and nothing else.
+template <class Number, std::size_t count>
+bool parse_list(std::string_view text, char separator, std::array<Number, count>& values) {
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t end = std::min(text.find(separator), text.size());
+        const auto [stop, error] = std::from_chars(text.data(), text.data() + end, values[i]);
+        if (error != std::errc() || stop != text.data() + end) return false;
+        const bool last = i + 1 == count;
+        if (last != (end == text.size())) return false;
+        text.remove_prefix(last ? end : end + 1);
+    }
+    return true;
+}
+
+Override parse_definition(const std::string& text) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0)
+        throw UsageError("-D " + text + ": must be key=value, such as -D render.spp=256");
+    return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+/// Overrides in the order typed, of -D and of the flags that stand for keys.
+std::vector<Override> collect_overrides(const CLI::App& app, const CLI::Option* definition,
+                                        const std::map<const CLI::Option*, const char*>& keys) {
+    std::vector<Override> overrides;
+    std::map<const CLI::Option*, std::size_t> used;
+    for (const CLI::Option* option : app.parse_order()) {
+        const auto key = keys.find(option);
+        if (option != definition && key == keys.end()) continue;
+        const std::string& text = option->results().at(used[option]++);
+        overrides.push_back(option == definition ? parse_definition(text) : Override{key->second, text});
+    }
+    return overrides;
+}
+
+/// The flag's help with the names that the scene file allows for its key.
+std::string help_of(const KeyFlag& flag) {
+    std::string text = flag.help;
+    for (const KeySpec& spec : scene_schema())
+        if (std::string(spec.section) + "." + std::string(spec.name) == flag.key && !spec.choices.empty())
+            text += ": " + std::string(spec.choices);
+    return text;
+}
+
+std::vector<std::string> flag_names(const CLI::App& app) {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : app.get_options()) {
+        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+        for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+    }
+    return names;
+}
+
+bool is_flag(const std::string& word) { return word.size() > 1 && word[0] == '-'; }
+
+/// Throws for the first argument that `app` (a subcommand, or the top level) did not take.
+void refuse_leftovers(const CLI::App& app, const CLI::App* top) {
+    const std::vector<std::string> left = app.remaining();
+    if (left.empty()) return;
+    const std::string where = top != nullptr ? app.get_name() + ": " : std::string();
+    const auto flag = std::find_if(left.begin(), left.end(), is_flag);
+    if (flag == left.end()) {
+        if (top != nullptr) throw UsageError(where + "unexpected argument '" + left.front() + "'");
+        std::vector<std::string> names;
+        for (const CLI::App* sub : app.get_subcommands({})) names.push_back(sub->get_name());
+        if (left.front().find(".json") != std::string::npos)
+            throw UsageError("unknown subcommand '" + left.front() + "'; to render a scene: clume render " + left.front());
+        throw UsageError("unknown subcommand '" + left.front() + "'; the nearest is '" + nearest_flag(left.front(), names) +
+                         "'");
+    }
+    const std::string name = flag->substr(0, flag->find('='));
+    if (top == nullptr)
+        for (const CLI::App* sub : app.get_subcommands({})) {
+            const std::vector<std::string> names = flag_names(*sub);
+            if (std::find(names.begin(), names.end(), name) != names.end())
+                throw UsageError("flag '" + name + "' belongs after the subcommand: clume " + sub->get_name() + " ... " + name);
+        }
+    throw UsageError(where + "unknown flag '" + name + "'; the nearest is '" + nearest_flag(name, flag_names(app)) + "'");
+}
+
+RenderCommand check_render(RenderTexts texts, RenderCommand command) {
+    if (texts.scene.empty()) throw UsageError("render: which scene? Such as: clume render scenes/plume.json");
+    command.scene = texts.scene;
+    command.exr = texts.output.empty() ? command.scene.stem().string() + ".exr" : texts.output;
+    std::string extension = command.exr.extension().string();
+    for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (extension != ".exr")
+        throw UsageError("-o " + texts.output + ": must end in .exr (the PNG preview is written beside it)");
+    if (!texts.stats_json.empty()) command.stats_json = texts.stats_json;
+    if (command.stats_json && (*command.stats_json == command.exr || *command.stats_json == command.png()))
+        throw UsageError("--stats-json " + texts.stats_json + ": is the name of the image");
+
+    RenderOptions& options = command.options;
+    std::array<std::uint32_t, 2> range{};
+    if (!texts.sample_range.empty()) {
+        if (!parse_list(texts.sample_range, ':', range) || range[0] >= range[1])
+            throw UsageError("--sample-range " + texts.sample_range + ": must be A:B with 0 <= A < B (B itself is left out)");
+        options.sample_begin = range[0];
+        options.sample_end = range[1];
+    }
+    std::array<int, 4> crop{};
+    if (!texts.crop.empty()) {
+        if (!parse_list(texts.crop, ',', crop) || crop[0] < 0 || crop[1] < 0 || crop[0] >= crop[2] || crop[1] >= crop[3])
+            throw UsageError("--crop " + texts.crop + ": must be x0,y0,x1,y1 in pixels with 0 <= x0 < x1 and 0 <= y0 < y1");
+        options.crop = CropWindow{crop[0], crop[1], crop[2], crop[3]};
+    }
+    if (texts.time_limit_s && !(*texts.time_limit_s > 0 && std::isfinite(*texts.time_limit_s)))
+        throw UsageError("--time-limit: must be a positive number of seconds");
+    options.time_limit_s = texts.time_limit_s;
+    if (texts.cpu_split && *texts.cpu_split < 1) throw UsageError("--cpu-split: must be at least 1");
+    options.cpu_split = texts.cpu_split.value_or(0);
+    options.devices = texts.devices;
+    if (!(std::abs(command.exposure_stops) <= 100)) throw UsageError("--exposure: must lie between -100 and 100 stops");
+    return command;
+}
+
+}  // namespace
+
+std::string nearest_flag(std::string_view word, std::span<const std::string> names) {
+    std::string nearest;
+    std::size_t best = static_cast<std::size_t>(-1);
+    for (const std::string& name : names) {
+        // Optimal string alignment distance, from the last three rows of its table.
+        std::vector<std::size_t> before(name.size() + 1), above(name.size() + 1), row(name.size() + 1);
+        std::iota(row.begin(), row.end(), std::size_t{0});
+        for (std::size_t i = 1; i <= word.size(); ++i) {
+            before = above;
+            above = row;
+            row[0] = i;
+            for (std::size_t j = 1; j <= name.size(); ++j) {
+                row[j] = std::min({above[j] + 1, row[j - 1] + 1, above[j - 1] + (word[i - 1] != name[j - 1] ? 1 : 0)});
+                if (i > 1 && j > 1 && word[i - 1] == name[j - 2] && word[i - 2] == name[j - 1])
+                    row[j] = std::min(row[j], before[j - 2] + 1);
+            }
+        }
+        // "--samples" is meant for "--sample-range" and "--depth" for "--max-depth": a part counts, at the price of one.
+        std::size_t distance = row.back();
+        if (word.size() >= 5) distance = std::min(distance, 1 + *std::min_element(row.begin(), row.end()));
+        if (word.size() >= 5 && name.find(word.substr(2)) != std::string::npos) distance = std::min<std::size_t>(distance, 1);
+        if (distance < best) {
+            best = distance;
+            nearest = name;
+        }
+    }
+    return nearest;
+}
+
+std::string in_typed_words(const std::string& message, std::span<const std::string_view> arguments) {
+    for (const KeyFlag& flag : key_flags) {
+        const std::string prefix = std::string("-D ") + flag.key + "=";
+        const bool typed = std::any_of(arguments.begin(), arguments.end(), [&](std::string_view argument) {
+            return argument.substr(0, argument.find('=')) == flag.flag;
+        });
+        if (typed && message.starts_with(prefix)) return std::string(flag.flag) + " " + message.substr(prefix.size());
+    }
+    return message;
+}
+
+Command parse_command_line(int argc, const char* const* argv) {
+    CLI::App app(overview, "clume");
+    app.footer(exit_codes);
+    app.set_version_flag("--version", "clume " CLUME_VERSION);
+    app.allow_extras();
+    app.set_help_flag("-h,--help", "print this help");
+
+    RenderTexts texts;
+    RenderCommand command;
+    CLI::App* render = app.add_subcommand("render", "render a scene to an EXR and a PNG; prints their paths");
+    render->allow_extras();
+    render->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    render->add_option("SCENE", texts.scene, "scene file (JSON, docs/scene.md)")->type_name("");
+    render->add_option("-o,--output", texts.output, "image to write; default: the scene's name, in the current folder")
+        ->type_name("OUT.exr");
+    std::map<const CLI::Option*, const char*> keys;
+    for (const KeyFlag& flag : key_flags) {
+        CLI::Option* option = render->add_option(flag.flag)->description(help_of(flag))->type_name(flag.value);
+        keys.emplace(option, flag.key);
+    }
+    render->add_option("--sample-range", texts.sample_range, "only samples A to B - 1 of each pixel")->type_name("A:B");
+    render->add_option("--crop", texts.crop, "only this part of the film, half-open")->type_name("x0,y0,x1,y1");
+    render->add_option("--time-limit", texts.time_limit_s, "stop after this long and write what is done")->type_name("SECONDS");
+    render->add_option("--device", texts.devices, "id, part of a name, cpu, gpu or all; several with commas or repeated")
+        ->type_name("DEVICE")
+        ->take_all()
+        ->allow_extra_args(false);
+    render->add_option("--cpu-split", texts.cpu_split, "use each CPU as N sub-devices")->type_name("N");
+    render->add_option("--exposure", command.exposure_stops, "brightness of the PNG, in stops; default 0")->type_name("STOPS");
+    CLI::Option* render_definition =
+        render->add_option("-D", texts.definitions, "override any key of the scene, such as -D film.width=256")
+            ->type_name("KEY=VALUE")
+            ->take_all()
+            ->allow_extra_args(false);
+    render->add_flag("--explain", command.explain, "print what the program is specialised to, on stderr");
+    render->add_flag("--quiet", command.quiet, "no progress on stderr");
+    render->add_option("--stats-json", texts.stats_json, "write statistics; - is stdout (the paths then go to stderr)")
+        ->type_name("FILE");
+
+    CLI::App* devices = app.add_subcommand("devices", "list the OpenCL devices of this machine")->allow_extras();
+    std::string info_file;
+    std::vector<std::string> info_definitions;
+    CLI::App* info = app.add_subcommand("info", "say what is in a scene or a PLY file")->allow_extras();
+    info->add_option("FILE", info_file, "scene (JSON) or ellipsoids (PLY)")->type_name("");
+    CLI::Option* info_definition = info->add_option("-D", info_definitions, "override any key of the scene")
+                                       ->type_name("KEY=VALUE")
+                                       ->take_all()
+                                       ->allow_extra_args(false);
+    app.add_subcommand("bench", "measure speed; see clume bench --help");
+
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::CallForHelp&) {
+        return PrintCommand{app.help()};
+    } catch (const CLI::CallForVersion& version) {
+        return PrintCommand{std::string(version.what()) + "\n"};
+    } catch (const CLI::ParseError& error) {
+        std::string text = error.what();
+        std::replace(text.begin(), text.end(), '\n', ' ');
+        throw UsageError(text);
+    }
+    refuse_leftovers(app, nullptr);
+    for (const CLI::App* sub : {render, devices, info})
+        if (sub->parsed()) refuse_leftovers(*sub, &app);
+    if (app.get_subcommands().size() > 1) throw UsageError("one subcommand at a time");
+
+    if (render->parsed()) {
+        command.overrides = collect_overrides(*render, render_definition, keys);
+        return check_render(std::move(texts), std::move(command));
+    }
+    if (devices->parsed()) return DevicesCommand{};
+    if (info->parsed()) {
+        if (info_file.empty()) throw UsageError("info: which file? Such as: clume info scenes/plume.json");
+        return InfoCommand{info_file, collect_overrides(*info, info_definition, {})};
+    }
+    throw UsageError("which subcommand? render, devices, info or bench; see clume --help");
+}
+
+}  // namespace clume

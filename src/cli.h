@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// The command line as data. Parsing only: nothing is read, written or rendered here.
+// Flags that stand for a scene key become overrides, in the order typed, so that the last one wins whichever way it is said.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "src/renderer.h"
+#include "src/scene_reader.h"
+
+namespace clume {
+
+struct RenderCommand {
+    std::filesystem::path scene;
+    std::filesystem::path exr;  ///< the PNG goes beside it
+    RenderOptions options;
+    std::vector<Override> overrides;
+    double exposure_stops = 0;
+    bool explain = false, quiet = false;
+    std::optional<std::filesystem::path> stats_json;  ///< "-": stdout
+
+    std::filesystem::path png() const { return std::filesystem::path(exr).replace_extension(".png"); }
+};
+
+struct DevicesCommand {};
+
+struct InfoCommand {
+    std::filesystem::path file;
+    std::vector<Override> overrides;
+};
+
+/// --help and --version: `text` goes to stdout.
+struct PrintCommand {
+    std::string text;
+};
+
+using Command = std::variant<PrintCommand, RenderCommand, DevicesCommand, InfoCommand>;
+
+/// Throws UsageError with one line that names the nearest right flag or subcommand. `bench` is the caller's: its arguments
+/// are not parsed here.
+Command parse_command_line(int argc, const char* const* argv);
+
+/// The name at the smallest edit distance (swapped neighbours count once), or at the smallest distance of its beginning
+/// plus one; empty without names.
+std::string nearest_flag(std::string_view word, std::span<const std::string> names);
+
+/// An override's error in the words that were typed: "-D render.spp=0: ..." becomes "--spp 0: ..." if that flag was used.
+std::string in_typed_words(const std::string& message, std::span<const std::string_view> arguments);
+
+}  // namespace clume

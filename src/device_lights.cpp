@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+#include "src/device_lights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace clume {
+namespace {
+
+using std::numbers::pi;
+
+device::float4 pack(const glm::dvec3& v, double w = 0) {
+    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
+}
+
+device::uint kind_bit(LightKind kind) {
+    switch (kind) {
+        case LightKind::constant: return LIGHT_CONSTANT;
+        case LightKind::envmap: return LIGHT_ENVMAP;
+        case LightKind::point: return LIGHT_POINT;
+        case LightKind::spot: return LIGHT_SPOT;
+        case LightKind::directional: return LIGHT_DIRECTIONAL;
+        case LightKind::sphere: return LIGHT_SPHERE;
+        case LightKind::rectangle: break;
+    }
+    return LIGHT_RECTANGLE;
+}
+
+double largest(const glm::dvec3& v) { return std::max({v.x, v.y, v.z}); }
+bool is_grey(const glm::dvec3& v) { return v.x == v.y && v.y == v.z; }
+
+/// Texels and alias table (Vose) of one environment; returns π × mean radiance, the irradiance it gives.
+double add_environment(const Light& light, DeviceScene& out, device::LightInfo& info, LightMasks& masks) {
+    const auto w = static_cast<std::size_t>(light.image.width), h = static_cast<std::size_t>(light.image.height), n = w * h;
+    info.width = static_cast<device::uint>(w);
+    info.height = static_cast<device::uint>(h);
+    info.texel_offset = static_cast<device::uint>(out.texels.size());
+    std::vector<double> weight(n);
+    double total = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        const auto row = static_cast<double>(i / w);
+        const double solid_angle = 2 * pi / static_cast<double>(w) *
+                                   (std::sin(pi * (0.5 - row / static_cast<double>(h))) - std::sin(pi * (0.5 - (row + 1) / static_cast<double>(h))));
+        const glm::dvec3 rgb = glm::dvec3(light.image.rgb[3 * i], light.image.rgb[3 * i + 1], light.image.rgb[3 * i + 2]) * light.scale;
+        masks.grey = masks.grey && is_grey(rgb);
+        masks.brightest = std::max(masks.brightest, largest(rgb));
+        out.texels.push_back(pack(rgb));
+        weight[i] = largest(rgb) * solid_angle;
+        total += weight[i];
+        out.alias.push_back({0xffffffffu, static_cast<device::uint>(i), static_cast<float>(solid_angle), 0});
+    }
+    device::AliasEntry* table = out.alias.data() + info.texel_offset;
+    for (std::size_t i = 0; i < n; ++i) table[i].pdf_texel = total > 0 ? static_cast<float>(weight[i] / total / static_cast<double>(table[i].pdf_texel)) : 0.0f;
+    if (!(total > 0)) return 0;
+    std::vector<std::size_t> small, large;
+    for (std::size_t i = 0; i < n; ++i) {
+        weight[i] *= static_cast<double>(n) / total;
+        (weight[i] < 1 ? small : large).push_back(i);
+    }
+    while (!small.empty() && !large.empty()) {
+        const std::size_t s = small.back(), l = large.back();
+        small.pop_back();
+        table[s].threshold = static_cast<device::uint>(std::min(weight[s] * 0x1p32, 4294967295.0));
+        table[s].other = static_cast<device::uint>(l);
+        weight[l] -= 1 - weight[s];
+        if (weight[l] < 1) {
+            large.pop_back();
+            small.push_back(l);
+        }
+    }
+    return total;
+}
+
+}  // namespace
+
+LightMasks add_lights(const Scene& scene, DeviceScene& out) {
+    LightMasks masks;
+    const Normalization& n = out.normalization;
+    const auto place = [&](const glm::dvec3& p) { return (p - n.center) * n.scale; };
+    std::vector<double> power;
+    for (const Light& light : scene.lights) {
+        device::LightInfo info{};
+        info.kind = kind_bit(light.kind);
+        glm::dvec3 color = light.radiance;
+        double irradiance = 0;  // about what it gives at the scene's centre
+        const auto falloff = [&](const glm::dvec3& p) { return 1 / std::max(glm::dot(p, p), 0.25); };
+        switch (light.kind) {
+            case LightKind::constant: irradiance = pi * largest(color); break;
+            case LightKind::envmap:
+                irradiance = add_environment(light, out, info, masks);
+                info.axis = pack({std::sin(light.rotate_y_rad), std::cos(light.rotate_y_rad), 0});
+                color = glm::dvec3(0);
+                break;
+            case LightKind::point:
+            case LightKind::spot:
+                color = light.intensity * n.scale * n.scale;
+                info.position = pack(place(light.position));
+                irradiance = largest(color) * falloff(place(light.position));
+                if (light.kind == LightKind::spot) {
+                    info.axis = pack(glm::normalize(light.target - light.position), light.cutoff_rad);
+                    info.edge_u = pack({std::min(1 / std::max(light.cutoff_rad - light.beam_rad, 1e-30), 1e12), 0, 0});
+                }
+                break;
+            case LightKind::directional:
+                color = light.irradiance;
+                info.position = pack(glm::normalize(light.direction));
+                irradiance = largest(color);
+                break;
+            case LightKind::sphere: {
+                const glm::dvec3 c = place(light.center);
+                const double r = light.radius * n.scale;
+                info.position = pack(c, r);
+                irradiance = largest(color) * pi * std::min(1.0, r * r * falloff(c));
+                break;
+            }
+            case LightKind::rectangle: {
+                const glm::dvec3 u = light.edge_u * n.scale, v = light.edge_v * n.scale, cross = glm::cross(u, v);
+                const double area = glm::length(cross);
+                info.position = pack(place(light.corner), area);
+                info.axis = pack(cross / area);
+                info.edge_u = pack(u);
+                info.edge_v = pack(v);
+                const double uu = glm::dot(u, u), uv = glm::dot(u, v), vv = glm::dot(v, v), det = uu * vv - uv * uv;
+                info.dual_u = pack((vv * u - uv * v) / det);
+                info.dual_v = pack((uu * v - uv * u) / det);
+                irradiance = largest(color) * std::min(pi, area * falloff(place(light.corner + 0.5 * (light.edge_u + light.edge_v))));
+                break;
+            }
+        }
+        info.radiance = pack(color);
+        info.visible = light.visible_to_camera ? 1 : 0;
+        masks.grey = masks.grey && is_grey(color);
+        masks.brightest = std::max(masks.brightest, largest(color));
+        masks.present |= info.kind;
+        masks.visible_background = masks.visible_background || light.visible_to_camera;
+        out.lights.push_back(info);
+        power.push_back(irradiance);
+    }
+    const device::uint found_by_paths = LIGHT_CONSTANT | LIGHT_ENVMAP | LIGHT_SPHERE | LIGHT_RECTANGLE;
+    switch (scene.render.light_sampling) {
+        case LightSampling::mis:  // a constant environment is found by escaping paths with less variance
+            masks.nee = masks.present & ~device::uint{LIGHT_CONSTANT};
+            masks.hits = masks.present & found_by_paths;
+            break;
+        case LightSampling::nee: masks.nee = masks.present; break;
+        case LightSampling::phase: masks.hits = masks.present & found_by_paths; break;
+    }
+    // Half by what each light gives, half evenly, so that none is starved where it happens to be near.
+    double total = 0;
+    int count = 0;
+    for (std::size_t i = 0; i < power.size(); ++i) {
+        if (!(out.lights[i].kind & masks.nee) || !(power[i] > 0)) power[i] = 0;
+        total += power[i];
+        count += power[i] > 0;
+    }
+    if (count == 0) masks.nee = 0;
+    double cumulative = 0;
+    for (std::size_t i = 0; i < power.size(); ++i) {
+        const double p = power[i] > 0 ? 0.5 * power[i] / total + 0.5 / count : 0;
+        cumulative += p;
+        out.lights[i].select_pdf = static_cast<float>(p);
+        out.lights[i].radiance.w = static_cast<float>(cumulative);
+    }
+    return masks;
+}
+
+}  // namespace clume

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// The scene as the device gets it: normalised, packed into layout.h's buffers, and the list of defines that specialises the
+// program to what the scene uses. Same bytes on every host (no contraction, no -march).
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "kernels/layout.h"
+#include "src/ellipsoid.h"
+#include "src/renderer.h"
+#include "src/scene.h"
+
+namespace clume {
+
+struct DeviceScene {
+    Normalization normalization;
+    device::RenderParams params{};
+    std::vector<device::uint> cells;
+    std::vector<device::CellLeaf> leaves;
+    std::vector<device::BvhNode> nodes;
+    std::vector<float> groups;
+    std::vector<device::uint> group_medium;
+    std::vector<device::MediumInfo> media;
+    std::vector<device::float4> shading;
+    std::vector<device::LightInfo> lights;
+    std::vector<device::float4> texels;
+    std::vector<device::AliasEntry> alias;
+
+    std::vector<std::pair<std::string, std::string>> defines;  ///< of the render program, but CLUME_WIDTH
+    std::vector<std::pair<std::string, std::string>> explain;  ///< feature → what the program does about it
+    std::string strategy, transmittance;                       ///< what `auto` became
+    std::vector<Ellipsoid> ellipsoids;
+    double accelerator_s = 0;                                  ///< seconds to build it
+
+    std::uint64_t byte_size() const;
+    std::string hash() const;  ///< SHA-256 over all buffers
+};
+
+/// Throws SceneError for what no strategy can render, RenderError for an impossible combination of options.
+DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options);
+
+/// Sphere about media and area lights, recentred and scaled (src/ellipsoid.h).
+Normalization normalize(const Scene& scene);
+
+}  // namespace clume

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+// A primitive as the accelerators and the device see it: recentred, normalised, whitened, in double; and the geometry that
+// bounds it. All bounds are conservative against the float arithmetic of the kernels: the support is dilated accordingly.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "src/scene.h"
+
+namespace clume {
+
+struct Ellipsoid {
+    glm::dvec3 center;
+    double w[6];             ///< W: rows of the upper triangle, w00 w01 w02 w11 w12 w22; |W (x − center)| = r
+    double sigma;            ///< peak extinction, density_scale included, per normalised length
+    double extent;           ///< E
+    double dilation;         ///< whitened distance by which float evaluation may be off
+    glm::dvec3 half;         ///< half edges of the dilated support's box
+    std::uint32_t medium;    ///< index into the scene's media
+    KernelFamily family;
+};
+
+struct Box {
+    glm::dvec3 lo, hi;
+};
+
+/// World to normalised coordinates: x' = (x − center) · scale, scale a power of two that brings the radius into [1, 2).
+struct Normalization {
+    glm::dvec3 center{0};
+    double scale = 1;
+    double radius = 1;  ///< of the media and area lights about center, world units
+};
+
+/// Whitened, normalised primitives of all media, in file order, media one after the other.
+std::vector<Ellipsoid> make_ellipsoids(const Scene& scene, const Normalization& n);
+
+/// The box of all dilated supports; empty media give lo > hi.
+Box bounds_of(std::span<const Ellipsoid> ellipsoids);
+
+/// A lower bound of |W (x − center)| over x in the box, tight but for rounding; 0 if the centre is inside.
+double box_distance(const Ellipsoid& e, const Box& box);
+
+/// Upper bound of the primitive's extinction over the box; 0 if its dilated support does not meet the box.
+double box_extinction(const Ellipsoid& e, const Box& box);
+
+}  // namespace clume

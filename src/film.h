@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// The film on the host: exact 128-bit sums per active pixel, to which batches add in any order with the same result.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include "kernels/layout.h"
+#include "src/renderer.h"
+
+namespace clume {
+
+class FilmSums {
+public:
+    /// `scale` is params.film_scale; `channels` 1 or 3.
+    FilmSums(std::size_t active_pixels, int channels, double scale);
+
+    /// Adds one batch: `sums` holds FILM_WORDS words for each of pixels × splits work-items (item = split · count + pixel),
+    /// for the active pixels [first, first + count), `samples` more samples each. Thread-safe.
+    void add(std::size_t first, std::size_t count, std::size_t splits, std::uint32_t samples, std::span<const std::uint64_t> sums);
+
+    struct Pixel {
+        double mean[3], variance[3], alpha;  ///< variance: of the mean
+        std::uint32_t samples;
+    };
+    Pixel pixel(std::size_t active) const;
+
+    std::uint64_t nonfinite() const { return nonfinite_; }
+    std::uint64_t violations() const { return violations_; }
+    std::uint64_t work() const { return work_; }
+
+private:
+    using Sum = unsigned __int128;
+    struct Sums {
+        Sum x[3]{}, xx[3]{};
+        std::uint64_t alpha = 0;
+        std::uint32_t samples = 0;
+    };
+    std::mutex mutex_;
+    std::vector<Sums> pixels_;
+    int channels_;
+    double scale_;
+    std::uint64_t nonfinite_ = 0, violations_ = 0, work_ = 0;
+};
+
+}  // namespace clume

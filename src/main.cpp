@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: MIT
+// Runs what the command line asks for and turns every outcome into an exit code and one message on stderr.
+// stdout carries results only: the paths of the images written, tables of `devices` and `info`.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "bench/bench.h"
+#include "runtime/device.h"
+#include "runtime/error.h"
+#include "src/cli.h"
+#include "src/error.h"
+#include "src/image_writer.h"
+#include "src/info.h"
+#include "src/interrupt.h"
+#include "src/progress.h"
+#include "src/renderer.h"
+#include "src/scene_reader.h"
+#include "src/stats_json.h"
+
+namespace {
+
+using namespace clume;
+
+void say(const std::string& text) { std::fputs(("clume: " + text + "\n").c_str(), stderr); }
+
+std::string join(const std::vector<std::string>& parts, const char* separator) {
+    return fmt::format("{}", fmt::join(parts, separator));
+}
+
+/// "64", or "12 to 13" where pixels differ.
+std::string samples_held(const RenderStats& stats) {
+    if (stats.samples_min == stats.samples_max) return fmt::format("{}", stats.samples_max);
+    return fmt::format("{} to {}", stats.samples_min, stats.samples_max);
+}
+
+ImageMetadata describe(const Scene& scene, const RenderCommand& command, const RenderStats& stats) {
+    std::vector<std::string> devices, drivers;
+    for (const DeviceShare& device : stats.devices) devices.push_back(device.name);
+    for (const DeviceInfo& device : list_devices()) {
+        const auto is_this = [&](const DeviceShare& share) { return share.name.find(device.name) != std::string::npos; };
+        if (std::any_of(stats.devices.begin(), stats.devices.end(), is_this))
+            drivers.push_back(device.name + ": " + device.version + ", driver " + device.driver);
+    }
+    const RenderOptions& options = command.options;
+    const std::uint32_t end = options.sample_end != 0 ? options.sample_end : scene.render.spp;
+    ImageMetadata metadata{
+        {"software", "clume " CLUME_VERSION},
+        {"scene", scene.path},
+        {"seed", std::to_string(scene.render.seed)},
+        {"samples", samples_held(stats)},
+        {"sampleRange", fmt::format("{}:{}", options.sample_begin, end)},
+        {"maxDepth", std::to_string(scene.render.max_depth)},
+        {"strategy", stats.strategy},
+        {"transmittance", stats.transmittance},
+        {"devices", join(devices, "; ")},
+        {"deviceVersions", join(drivers, "; ")},
+        {"layoutHash", stats.layout_hash},
+        {"renderTime", fmt::format("{:.3f} s", stats.render_s)},
+    };
+    std::vector<std::string> overrides;
+    for (const Override& o : command.overrides) overrides.push_back(o.key + "=" + o.value);
+    if (!overrides.empty()) metadata.emplace_back("overrides", join(overrides, " "));
+    if (!stats.warnings.empty()) metadata.emplace_back("warnings", join(stats.warnings, "\n"));
+    if (stats.nonfinite_samples > 0) metadata.emplace_back("nonfiniteSamples", std::to_string(stats.nonfinite_samples));
+    return metadata;
+}
+
+void print_explanation(const Scene& scene, const RenderOptions& options) {
+    const auto table = explain(scene, options);
+    std::size_t width = 0;
+    for (const auto& [feature, what] : table) width = std::max(width, feature.size());
+    for (const auto& [feature, what] : table) std::fputs(fmt::format("{:<{}}  {}\n", feature, width, what).c_str(), stderr);
+}
+
+/// Says what is to be known about the render; the exit code.
+int report(const RenderStats& stats) {
+    for (const std::string& warning : stats.warnings) say("warning: " + warning);
+    if (stats.bound_violations > 0)
+        say(fmt::format("warning: density above its bound {} times: the image may be wrong", stats.bound_violations));
+    if (stats.nonfinite_samples > 0)
+        say(fmt::format("warning: {} samples were not finite and count as 0", stats.nonfinite_samples));
+    if (stats.interrupted) {
+        say(fmt::format("interrupted: the image holds {} samples per pixel", samples_held(stats)));
+        return interrupted_exit_code;
+    }
+    if (stats.time_limited) say(fmt::format("time limit reached: the image holds {} samples per pixel", samples_held(stats)));
+    return stats.nonfinite_samples > 0 ? 1 : 0;
+}
+
+int run(const RenderCommand& command) {
+    check_writable(command.exr);
+    check_writable(command.png());
+    const bool json_on_stdout = command.stats_json && *command.stats_json == "-";
+    if (command.stats_json && !json_on_stdout) check_writable(*command.stats_json);
+    install_interrupt_handlers();
+
+    const Scene scene = read_scene(command.scene, command.overrides);
+    if (const auto& crop = command.options.crop; crop && (crop->x1 > scene.film.width || crop->y1 > scene.film.height))
+        throw UsageError(fmt::format("--crop {},{},{},{}: reaches beyond the film, which is {} x {}", crop->x0, crop->y0,
+                                     crop->x1, crop->y1, scene.film.width, scene.film.height));
+    if (command.explain) print_explanation(scene, command.options);
+
+    ProgressReporter progress(command.quiet, command.options.time_limit_s);
+    RenderResult result = render(
+        scene, command.options, [&](const Progress& p) { progress.update(p); }, stop_requested());
+    progress.finish();
+    const RenderStats& stats = result.stats;
+    if (stats.samples_max == 0 && (stats.interrupted || stop_requested())) {
+        say("interrupted before the first sample: nothing was written");
+        return interrupted_exit_code;
+    }
+    if (stats.samples_max == 0 && stats.time_limited)
+        throw RenderError("the time limit was reached before the first sample: nothing was written");
+
+    write_exr(command.exr, result.image, describe(scene, command, stats));
+    write_png(command.png(), result.image, command.exposure_stops);
+    std::FILE* paths = json_on_stdout ? stderr : stdout;
+    std::fputs((command.exr.string() + "\n" + command.png().string() + "\n").c_str(), paths);
+    if (command.stats_json) write_stats_json(*command.stats_json, stats);
+    return report(stats);
+}
+
+int run(const DevicesCommand&) {
+    const std::vector<DeviceInfo> devices = list_devices();
+    if (devices.empty()) select_from(devices, {});  // throws, saying how to get one
+    for (const DeviceInfo& device : devices) {
+        fmt::print("{}\n  {}, {} compute units, native width {} floats, {:.1f} GiB{}\n", device.id, device.type,
+                   device.compute_units, device.native_vector_width, static_cast<double>(device.global_memory) / 0x1p30,
+                   device.available ? "" : ", not available");
+        fmt::print("  {}\n  {}, {}\n  driver {}\n", device.name, device.platform, device.version, device.driver);
+    }
+    return 0;
+}
+
+int run(const InfoCommand& command) {
+    print_info(command.file, command.overrides);
+    return 0;
+}
+
+int run(const PrintCommand& command) {
+    std::fputs(command.text.c_str(), stdout);
+    return 0;
+}
+
+int run_all(int argc, char** argv) {
+    if (argc > 1 && std::string_view(argv[1]) == "bench") return run_bench(argc - 1, argv + 1);
+    return std::visit([](const auto& command) { return run(command); }, parse_command_line(argc, argv));
+}
+
+/// Results that did not reach stdout (a full disk) are a failure, too.
+int with_flushed_output(int code) {
+    std::cout.flush();
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout) return code;
+    say("stdout: cannot be written");
+    return code == 0 ? 1 : code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return with_flushed_output(run_all(argc, argv));
+    } catch (const UsageError& error) {
+        const std::vector<std::string_view> arguments(argv + std::min(argc, 1), argv + argc);
+        say(in_typed_words(error.what(), arguments));
+        return 2;
+    } catch (const SceneError& error) {
+        std::fputs((std::string(error.what()) + "\n").c_str(), stderr);  // file:line:column first, as editors want it
+        return 3;
+    } catch (const DeviceError& error) {
+        say(error.what());
+        return 4;
+    } catch (const std::bad_alloc&) {
+        say("out of memory");
+        return 1;
+    } catch (const std::exception& error) {
+        say(error.what());
+        return 1;
+    } catch (...) {
+        say("an unknown error");
+        return 1;
+    }
+}

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+// Renders a scene on one or several OpenCL devices: chooses what the program is specialised to, hands out batches,
+// adds up the film exactly and returns means. Nothing here reads or writes files.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "src/scene.h"
+
+namespace clume {
+
+/// Half-open pixel rectangle inside the film.
+struct CropWindow {
+    int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+
+struct RenderOptions {
+    std::vector<std::string> devices;          ///< as on the command line: ids, name parts, cpu, gpu, all; empty: the best one
+    int cpu_split = 0;                         ///< > 1: each CPU device becomes that many sub-devices
+    std::uint32_t sample_begin = 0;            ///< samples [begin, end) of each pixel; end 0 means render.spp
+    std::uint32_t sample_end = 0;
+    std::optional<CropWindow> crop;            ///< default: the whole film
+    std::optional<double> time_limit_s;        ///< stop handing out batches after this long; the image holds what was done
+    std::uint32_t batch_samples = 0;           ///< samples of a pixel per batch; 0: sized to 100–200 ms by measurement
+    int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own
+    std::string accelerator = "cells";         ///< "cells" or "bvh" (decomposition, analytic and march only)
+};
+
+/// What was rendered; arrays cover the crop window, row 0 on top.
+struct RenderImage {
+    int film_width = 0, film_height = 0;
+    CropWindow window;
+    std::vector<float> rgb;                    ///< premultiplied, 3 per pixel
+    std::vector<float> alpha;                  ///< 1 per pixel
+    std::vector<float> variance;               ///< of the mean, 3 per pixel (NaN-free; 0 with fewer than 2 samples)
+    std::vector<std::uint32_t> samples;        ///< samples held, 1 per pixel
+};
+
+struct DeviceShare {
+    std::string name;
+    std::uint64_t paths = 0;
+    double busy_s = 0;
+};
+
+struct RenderStats {
+    std::string strategy, transmittance;       ///< what `auto` became
+    std::vector<DeviceShare> devices;
+    std::uint64_t paths = 0;                   ///< samples × pixels of the window
+    std::uint64_t empty_pixels = 0;            ///< proven empty, or of constant background: cost nothing
+    std::uint64_t nonfinite_samples = 0;       ///< counted, added as 0
+    std::uint64_t bound_violations = 0;        ///< density above its majorant; 0 unless a bound was wrong
+    std::uint64_t primitives = 0;
+    std::uint64_t device_bytes = 0;            ///< scene buffers on one device
+    std::string layout_hash;                   ///< SHA-256 of the device buffers
+    double build_s = 0, compile_s = 0, render_s = 0;
+    bool interrupted = false, time_limited = false;
+    bool device_lost = false;                  ///< no device was left before the end; the image holds what was done
+    std::uint32_t samples_min = 0, samples_max = 0;  ///< held per pixel
+    std::vector<std::string> warnings;         ///< e.g. a dropped device, a device outside the bit-exact set
+    std::vector<std::pair<std::string, std::string>> explain;  ///< feature → what the program does about it
+};
+
+struct Progress {
+    std::uint64_t paths_done = 0, paths_total = 0;
+    double elapsed_s = 0;
+    double mpaths_s = 0;
+};
+
+struct RenderResult {
+    RenderImage image;
+    RenderStats stats;
+};
+
+/// Throws RenderError, SceneError (a film too large), DeviceError (runtime/error.h; no device, all failed with nothing done).
+/// `progress` is called from one thread, a few times a second. `stop` set to true: batches under way are finished, then it
+/// returns what is done.
+RenderResult render(const Scene& scene, const RenderOptions& options, const std::function<void(const Progress&)>& progress,
+                    const std::atomic<bool>& stop);
+
+/// What `--explain` prints without rendering.
+std::vector<std::pair<std::string, std::string>> explain(const Scene& scene, const RenderOptions& options);
+
+}  // namespace clume

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+// RenderStats to JSON with RapidJSON's writer. Text that isn't UTF-8 (a driver's device name may be anything) gets '?'.
+#include "src/stats_json.h"
+
+#include <rapidjson/prettywriter.h>
+#include <rapidjson/stringbuffer.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+
+#include "src/error.h"
+#include "src/output_file.h"
+
+namespace clume {
+
+namespace {
+
+using Writer = rapidjson::PrettyWriter<rapidjson::StringBuffer>;
+
+void put(Writer& out, double value) {
+    if (std::isfinite(value))
+        out.Double(value);
+    else
+        out.Null();
+}
+void put(Writer& out, bool value) { out.Bool(value); }
+void put(Writer& out, std::uint32_t value) { out.Uint(value); }
+void put(Writer& out, std::uint64_t value) { out.Uint64(value); }
+
+void put(Writer& out, const std::string& value) {
+    rapidjson::StringStream source(value.c_str());
+    rapidjson::StringBuffer checked;
+    bool valid = true;
+    while (valid && source.Peek() != '\0') valid = rapidjson::UTF8<>::Validate(source, checked);
+    std::string text = value;
+    if (!valid)
+        for (char& c : text)
+            if (static_cast<unsigned char>(c) >= 0x80) c = '?';
+    out.String(text.c_str(), static_cast<rapidjson::SizeType>(text.size()));
+}
+
+void put(Writer& out, const DeviceShare& device);
+
+template <class Value>
+void put(Writer& out, const std::vector<Value>& values) {
+    out.StartArray();
+    for (const Value& value : values) put(out, value);
+    out.EndArray();
+}
+
+template <class Value>
+void put_member(Writer& out, const char* key, const Value& value) {
+    out.Key(key);
+    put(out, value);
+}
+
+void put(Writer& out, const DeviceShare& device) {
+    out.StartObject();
+    put_member(out, "name", device.name);
+    put_member(out, "paths", device.paths);
+    put_member(out, "busy_s", device.busy_s);
+    out.EndObject();
+}
+
+}  // namespace
+
+std::string stats_to_json(const RenderStats& stats) {
+    rapidjson::StringBuffer buffer;
+    Writer out(buffer);
+    out.SetIndent(' ', 2);
+    out.StartObject();
+    put_member(out, "version", std::string(CLUME_VERSION));
+    put_member(out, "strategy", stats.strategy);
+    put_member(out, "transmittance", stats.transmittance);
+    put_member(out, "devices", stats.devices);
+    put_member(out, "paths", stats.paths);
+    put_member(out, "empty_pixels", stats.empty_pixels);
+    put_member(out, "nonfinite_samples", stats.nonfinite_samples);
+    put_member(out, "bound_violations", stats.bound_violations);
+    put_member(out, "primitives", stats.primitives);
+    put_member(out, "device_bytes", stats.device_bytes);
+    put_member(out, "layout_hash", stats.layout_hash);
+    put_member(out, "build_s", stats.build_s);
+    put_member(out, "compile_s", stats.compile_s);
+    put_member(out, "render_s", stats.render_s);
+    put_member(out, "interrupted", stats.interrupted);
+    put_member(out, "time_limited", stats.time_limited);
+    put_member(out, "samples_min", stats.samples_min);
+    put_member(out, "samples_max", stats.samples_max);
+    put_member(out, "warnings", stats.warnings);
+    out.Key("explain");
+    out.StartObject();
+    for (const auto& [feature, what] : stats.explain) put_member(out, feature.c_str(), what);
+    out.EndObject();
+    out.EndObject();
+    return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+}
+
+void write_stats_json(const std::filesystem::path& path, const RenderStats& stats) {
+    const std::string text = stats_to_json(stats);
+    if (path == "-") {
+        if (std::fputs(text.c_str(), stdout) < 0 || std::fflush(stdout) != 0) throw RenderError("stdout: cannot be written");
+        return;
+    }
+    OutputFile file(path);
+    std::fwrite(text.data(), 1, text.size(), file.stream());
+    file.commit();
+}
+
+}  // namespace clume

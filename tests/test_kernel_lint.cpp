@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// Every kernel program, assembled as the renderer assembles it, through clang's OpenCL C 1.2 front end with warnings as errors:
+// an implementation that forgives (PoCL does) is not the one that decides what is OpenCL C.
+#include <unistd.h>
+
+#include <sys/wait.h>
+#include <array>
+#include <catch2/catch.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "runtime/embedded.h"
+#include "runtime/source.h"
+
+namespace {
+
+struct LintResult {
+    bool passed = false;
+    std::string output;
+};
+
+LintResult lint(const std::string& source, const std::string& defines) {
+    const std::filesystem::path file =
+        std::filesystem::temp_directory_path() / ("clume-lint-" + std::to_string(getpid()) + ".cl");
+    std::ofstream(file) << source;
+    const std::string command =
+        "clang -x cl -cl-std=CL1.2 --target=spir64 -fsyntax-only -Wall -Werror " + defines + " '" + file.string() + "' 2>&1";
+    LintResult result;
+    std::FILE* pipe = popen(command.c_str(), "r");
+    REQUIRE(pipe != nullptr);
+    std::array<char, 4096> block{};
+    while (const std::size_t count = std::fread(block.data(), 1, block.size(), pipe)) result.output.append(block.data(), count);
+    const int status = pclose(pipe);
+    result.passed = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    std::filesystem::remove(file);
+    return result;
+}
+
+bool has_clang() { return std::system("command -v clang >/dev/null 2>&1") == 0; }
+
+/// .cl files that no other one includes: the roots of programs.
+std::vector<std::string> program_roots() {
+    std::string all;
+    for (const clume::EmbeddedFile& file : clume::embedded_kernels()) all += file.text;
+    std::vector<std::string> roots;
+    for (const clume::EmbeddedFile& file : clume::embedded_kernels()) {
+        const std::string name(file.name);
+        if (name.ends_with(".cl") && all.find("#include \"" + name + "\"") == std::string::npos) roots.push_back(name);
+    }
+    return roots;
+}
+
+}  // namespace
+
+TEST_CASE("Kernels.LintIsClean") {
+    if (!has_clang()) {
+        WARN("SKIPPED: clang is not installed, kernels are not linted");
+        return;
+    }
+    const std::vector<std::string> roots = program_roots();
+    REQUIRE_FALSE(roots.empty());
+    const int width = GENERATE(16, 8, 4, 1), strategy = GENERATE(1, 2, 3), accelerator = GENERATE(1, 2);
+    const std::string defines = "-DCLUME_WIDTH=" + std::to_string(width) + " -DCLUME_STRATEGY=" + std::to_string(strategy) +
+                                " -DCLUME_ACCEL=" + std::to_string(accelerator);
+    for (const std::string& root : roots) {
+        const LintResult result = lint(clume::assemble_source(root), defines);
+        INFO(root << " " << defines << "\n" << result.output);
+        CHECK(result.passed);
+    }
+}
+
+TEST_CASE("Kernels.LintFindsWhatOpenClForbids") {
+    if (!has_clang()) {
+        WARN("SKIPPED: clang is not installed, kernels are not linted");
+        return;
+    }
+    CHECK(lint("__kernel void k(__global float* a) { a[get_global_id(0)] = fma(a[0], a[1], convert_float_rte(1)); }\n", "")
+              .passed);
+    CHECK_FALSE(lint("__kernel void k(__global float* a) { int unused; a[0] = 1; }\n", "").passed);
+    CHECK_FALSE(lint("__kernel void k(__global float* a) { a[0] = nosuchfunction(1); }\n", "").passed);
+    CHECK_FALSE(lint("__kernel void k(float* a) { a[0] = 1; }\n", "").passed);
+}
