@@ -8,6 +8,8 @@
 //   group_medium uint                per group: index into media
 //   cells    uint                    root cells, x fastest, then blocks of 8 children; see CELL_* below
 //   leaves   CellLeaf                per non-empty cell
+//   references Reference             per (cell, primitive): an alias table over the cell's bounds, for null collisions
+//   primitives Primitive             per primitive, one cache line
 //   nodes    BvhNode                 8-wide bounding volume hierarchy; leaves are groups
 //   media    MediumInfo              per medium
 //   shading  float4[2]               per primitive: albedo, g | emission, medium index (as_uint)
@@ -88,9 +90,28 @@ typedef struct RenderParams {
 } RenderParams;
 
 typedef struct CellLeaf {
-    uint first_group, group_count;
-    float majorant, inverse_majorant;
+    uint first_group, group_count;          // decomposition, analytic transmittance, march; else 0
+    uint first_reference, reference_count;  // delta; else 0
+    float majorant, inverse_majorant;       // sum of the references' bounds
+    uint pad0, pad1;
 } CellLeaf;
+
+// One primitive of a cell: it collides here at the rate bound · K(r²) · scale, its bound's share of the cell's majorant
+// being what the alias table gives it.
+typedef struct Reference {
+    uint threshold, other;  // alias table: keep this one if a word is below threshold, else take the other-th of the cell
+    uint primitive;
+    float scale;  // peak / bound: K · scale <= 1 in this cell
+} Reference;
+
+typedef struct Primitive {
+    float mu[3];
+    float w[6];  // upper triangle of the whitening, row-major
+    float sigma;
+    float extent_squared;
+    uint family;
+    uint medium, pad0, pad1, pad2;
+} Primitive;
 
 typedef struct BvhNode {
     float lo_x[BVH_ARITY], lo_y[BVH_ARITY], lo_z[BVH_ARITY];
@@ -128,7 +149,7 @@ typedef struct PathState {
 } PathState;
 
 #ifdef __cplusplus
-static_assert(sizeof(RenderParams) == 240 && sizeof(CellLeaf) == 16 && sizeof(BvhNode) == 224 && sizeof(MediumInfo) == 16);
+static_assert(sizeof(RenderParams) == 240 && sizeof(CellLeaf) == 32 && sizeof(Reference) == 16 && sizeof(Primitive) == 64 && sizeof(BvhNode) == 224 && sizeof(MediumInfo) == 16);
 static_assert(sizeof(LightInfo) == 144 && sizeof(AliasEntry) == 16 && sizeof(PathState) == 80);
 }  // namespace clume::device
 #endif

@@ -175,7 +175,7 @@ static bool light_sample(float3 o, uint4 bits, uint4 more, LightSample* s, __con
 #if CLUME_NEE & LIGHT_ENVMAP
     if (kind == LIGHT_ENVMAP) {
         const uint count = lights[i].width * lights[i].height, offset = lights[i].texel_offset;
-        uint texel = mul_hi(bits.y, count);
+        uint texel = uniform_index(bits.y, count);
         if (bits.z >= alias[offset + texel].threshold) texel = alias[offset + texel].other;
         const uint row = texel / lights[i].width, column = texel - row * lights[i].width;
         // Uniform in the texel: lon is linear in the column; sin(lat) is uniform between the sines of the row's edges.

@@ -54,7 +54,7 @@ static float3 cross_s(float3 a, float3 b) {
 static float3 along_s(float3 o, float3 d, float t) {
     return (float3)(fma(t, d.x, o.x), fma(t, d.y, o.y), fma(t, d.z, o.z));
 }
-/// v / |v|, for 1e-12 < |v| < 1e12.
+/// v / |v|, for 1e-12 < |v| < 1e12; each component error < 1.5e-7.
 static float3 normalize_s(float3 v) {
     const float s = rsqrt_s(dot_s(v, v));
     return v * s;

@@ -5,10 +5,11 @@
 
 #define SCENE_ARGS                                                                                                    \
     __constant const RenderParams *params, __global const uint *cells, __global const CellLeaf *leaves,               \
-        __global const BvhNode *nodes, __global const float *groups, __global const uint *group_medium,               \
-        __global const MediumInfo *media, __global const float4 *shading, __global const LightInfo *lights,           \
-        __global const float4 *texels, __global const AliasEntry *alias
-#define SCENE params, cells, leaves, nodes, groups, group_medium, media, shading, lights, texels, alias
+        __global const Reference *references, __global const Primitive *primitives, __global const BvhNode *nodes,    \
+        __global const float *groups, __global const uint *group_medium, __global const MediumInfo *media,            \
+        __global const float4 *shading, __global const LightInfo *lights, __global const float4 *texels,              \
+        __global const AliasEntry *alias
+#define SCENE params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias
 
 // With one medium, family and extent are constants of the program.
 #if CLUME_ONE_MEDIUM
@@ -94,7 +95,8 @@ static void group_decompose(uint g, float3 o, float3 d, float t_begin, float low
         const float* lane = (const float*)&t;
         for (int i = 0; i < CLUME_WIDTH; ++i) {
             const uint lane_id = as_uint(part[16 * CLUME_ROW_ID + i]);
-            if (lane[i] < *best || (lane[i] == *best && lane_id < *primitive)) {
+            // No tie with "none yet": lanes that do not collide stand at CLUME_INFINITY, where `best` may, too.
+            if (lane[i] < *best || (lane[i] == *best && *primitive != CLUME_NO_PRIMITIVE && lane_id < *primitive)) {
                 *best = lane[i];
                 *primitive = lane_id;
             }

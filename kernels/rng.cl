@@ -11,16 +11,23 @@
 #define DRAW_ROULETTE 0xf0000003u
 #define DRAW_LIGHT_MORE 0xf0000004u
 
-/// 128 random bits; counter = (sample, pixel, depth, draw), key = seed.
-static uint4 philox(uint4 c, uint2 k) {
+/// 128 random bits; counter = (sample, pixel, depth, draw), key = seed. 64-bit products: some mul_hi are slow.
+static uint4 philox(uint4 counter, uint2 key) {
+    uint x = counter.x, y = counter.y, z = counter.z, w = counter.w, a = key.x, b = key.y;
     for (int round = 0; round < 7; ++round) {
-        const uint lo0 = c.x * 0xD2511F53u, hi0 = mul_hi(c.x, 0xD2511F53u);
-        const uint lo1 = c.z * 0xCD9E8D57u, hi1 = mul_hi(c.z, 0xCD9E8D57u);
-        c = (uint4)(hi1 ^ c.y ^ k.x, lo1, hi0 ^ c.w ^ k.y, lo0);
-        k += (uint2)(0x9E3779B9u, 0xBB67AE85u);
+        const ulong p = (ulong)x * 0xD2511F53u, q = (ulong)z * 0xCD9E8D57u;
+        x = (uint)(q >> 32) ^ y ^ a;
+        y = (uint)q;
+        z = (uint)(p >> 32) ^ w ^ b;
+        w = (uint)p;
+        a += 0x9E3779B9u;
+        b += 0xBB67AE85u;
     }
-    return c;
+    return (uint4)(x, y, z, w);
 }
+
+/// floor(x · n / 2^32): uniform in [0, n) for 32 random bits, to within n 2^-32.
+static uint uniform_index(uint x, uint n) { return (uint)(((ulong)x * n) >> 32); }
 
 /// Uniform in (0, 1): (x + 1/2) 2^-32 rounded to float, kept below 1.
 static float uniform_s(uint x) { return min_s((from_uint_s(x) + 0.5f) * 0x1p-32f, 0x1.fffffep-1f); }

@@ -35,6 +35,9 @@ __kernel void probe_arithmetic(__global const float* in, __global uint* out) {
 #define PROBE_COS_TURNS 13
 #define PROBE_ERF_BETWEEN 14
 #define PROBE_UNIFORM 15
+#define PROBE_ACOS 16
+#define PROBE_FROM_UINT 17
+#define PROBE_NORMALIZE_X 18
 
 /// out[i] = f(x[i], y[i]), f by number; work-item k does CLUME_WIDTH of them. Scalar-only functions run lane by lane.
 __kernel void probe_math(__global const float* x, __global const float* y, __global float* out, uint count, uint function) {
@@ -54,6 +57,7 @@ __kernel void probe_math(__global const float* x, __global const float* y, __glo
         case PROBE_ERFC_INVERSE: r = erfc_inverse_v(a); break;
         case PROBE_EPANECHNIKOV_INVERSE: r = epanechnikov_inverse_v(a); break;
         case PROBE_ERF_BETWEEN: r = erf_between(a, b); break;
+        case PROBE_FROM_UINT: r = from_uint_v(as_vuint(a)); break;
         default: break;
     }
     const float* al = (const float*)&a;
@@ -66,6 +70,8 @@ __kernel void probe_math(__global const float* x, __global const float* y, __glo
             case PROBE_SIN_TURNS: rl[i] = sincos_turns_s(al[i]).x; break;
             case PROBE_COS_TURNS: rl[i] = sincos_turns_s(al[i]).y; break;
             case PROBE_UNIFORM: rl[i] = uniform_s(as_uint(al[i])); break;
+            case PROBE_ACOS: rl[i] = acos_s(al[i]); break;
+            case PROBE_NORMALIZE_X: rl[i] = normalize_s((float3)(al[i], bl[i], bl[i])).x; break;
             default: break;
         }
         out[first + i] = rl[i];

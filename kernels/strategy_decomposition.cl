@@ -19,7 +19,7 @@ static int flight_decomposition(float3 o, float3 d, float t_end, Flight* f, cons
                 f->work += leaf.group_count;
             }
             lower = w.t_exit;
-        } while (best > w.t_exit && cells_next(&w, params, cells));
+        } while (best > w.t_exit && cells_next(&w, cells));
     }
 #else
     bvh_decompose(o, d, 0.0f, key, &best, &primitive, &f->work, SCENE);

@@ -26,7 +26,7 @@ static int flight_march(float3 o, float3 d, float t_end, Flight* f, const Draws*
         if (!(begin < last)) return FLIGHT_ESCAPED;
 #if CLUME_ACCEL == ACCEL_CELLS
         while (w.t_exit <= middle)
-            if (!cells_next(&w, params, cells)) return FLIGHT_ESCAPED;
+            if (!cells_next(&w, cells)) return FLIGHT_ESCAPED;
         if (w.entry < CELL_EMPTY_MAX) {
             k = max_s(k + 1.0f, floor(divide_s(w.t_exit, step) - 0.5f));
             continue;

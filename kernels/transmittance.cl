@@ -18,7 +18,7 @@ static float transmittance_analytic(float3 o, float3 d, float t_end, SCENE_ARGS)
             if (depth >= ((ulong)128 << 40)) return 0.0f;
         }
         lower = w.t_exit;
-    } while (cells_next(&w, params, cells));
+    } while (cells_next(&w, cells));
     return depth_transmittance(depth);
 #else
     return depth_transmittance(bvh_depth(o, d, 0.0f, t_end, SCENE));

@@ -66,6 +66,10 @@ void BatchPlan::start_pass() {
             return costs_.reference_cost(a) > costs_.reference_cost(b);
         });
     }
+    count_unassigned();
+}
+
+void BatchPlan::count_unassigned() {
     unassigned_ = 0;
     for (std::uint32_t item = 0; item < next_.size(); ++item)
         unassigned_ += costs_.reference_cost(item) * static_cast<double>(end_ - next_[item]);
@@ -83,7 +87,7 @@ std::uint32_t BatchPlan::batch_units(std::size_t worker, std::uint32_t item, std
         target = std::clamp(seconds_left() / 2, target_s_ * smallest_share, target_s_);
     const double pieces = std::ceil(static_cast<double>(available) * cost / target * 0.999);
     if (pieces <= 1) return available;
-    return std::max(1u, static_cast<std::uint32_t>(std::ceil(static_cast<double>(available) / pieces)));
+    return std::max(1u, static_cast<std::uint32_t>(std::round(static_cast<double>(available) / pieces)));
 }
 
 bool BatchPlan::others_finish_first(std::size_t worker, std::uint32_t item) const {
@@ -124,9 +128,9 @@ std::optional<Batch> BatchPlan::next(std::size_t worker) {
 }
 
 void BatchPlan::done(std::size_t worker, const Batch& batch, double seconds) {
-    costs_.measured(worker, batch.item, batch.end - batch.begin, seconds);
     measured_[worker] = 1;
     in_hand_[worker] = 0;
+    if (costs_.measured(worker, batch.item, batch.end - batch.begin, seconds)) count_unassigned();
 }
 
 void BatchPlan::failed(std::size_t worker, const Batch& batch) {

@@ -30,6 +30,7 @@ public:
 
 private:
     void start_pass();
+    void count_unassigned();
     std::uint32_t batch_units(std::size_t worker, std::uint32_t item, std::uint32_t available) const;
     bool others_finish_first(std::size_t worker, std::uint32_t item) const;
     double live_speed() const;

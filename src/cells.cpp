@@ -19,16 +19,13 @@ struct Cost {
     double operator()(double size, std::size_t primitives, double majorant) const {
         const double groups = std::ceil(static_cast<double>(primitives) / CLUME_GROUP_SIZE);
         const double visits = 1.5 / size;
-        const double null = visits * c.step + majorant * (c.tentative + groups * c.density);
+        const double null = visits * c.step + majorant * c.tentative;
         const double chord = visits * (c.step + groups * c.chord);
         return c.null_share * null + c.chord_share * chord;
     }
 };
 
-struct List {
-    std::vector<std::uint32_t> primitives;
-    double majorant = 0;
-};
+using List = Cells::Leaf;
 
 /// The primitives among `candidates` that meet the box, and their bound.
 template <class Candidates>
@@ -37,8 +34,10 @@ List list_of(std::span<const Ellipsoid> ellipsoids, const Candidates& candidates
     for (const std::uint32_t i : candidates) {
         const double bound = box_extinction(ellipsoids[i], box);
         if (!(bound > 0)) continue;
+        const float up = std::nextafter(static_cast<float>(bound * (1 + 1e-5)), 1e30f);
         list.primitives.push_back(i);
-        list.majorant += bound;
+        list.bounds.push_back(up);
+        list.majorant += static_cast<double>(up);
     }
     return list;
 }
@@ -70,7 +69,7 @@ struct Refiner {
 
     std::uint32_t leaf(Subtree& out, List&& list) const {
         if (list.primitives.empty()) return 1;
-        out.leaves.push_back({std::move(list.primitives), list.majorant});
+        out.leaves.push_back(std::move(list));
         return CELL_EMPTY_MAX + static_cast<std::uint32_t>(out.leaves.size() - 1);
     }
 
@@ -80,19 +79,17 @@ struct Refiner {
         const double groups = std::ceil(static_cast<double>(n) / CLUME_GROUP_SIZE);
         out.depth = std::max(out.depth, level);
         // Nothing to gain where crossing the cell costs little more than entering it.
-        const double evaluation = costs.null_share * list.majorant * size * (costs.tentative + groups * costs.density) +
+        const double evaluation = costs.null_share * list.majorant * size * costs.tentative +
                                   costs.chord_share * groups * costs.chord;
-        if (n == 0 || level == max_levels || evaluation < costs.step || (n <= 4 && list.majorant * size < 1)) return leaf(out, std::move(list));
+        if (n == 0 || level == max_levels || evaluation < costs.step) return leaf(out, std::move(list));
         List children[8];
-        double majorant = 0, child_cost = 0;
+        double child_cost = 0;
         std::size_t references = 0;
         for (int k = 0; k < 8; ++k) {
             children[k] = list_of(ellipsoids, list.primitives, octant(box, k));
-            majorant = std::max(majorant, children[k].majorant);
             references += children[k].primitives.size();
             child_cost += cost(0.5 * size, children[k].primitives.size(), children[k].majorant) / 8;
         }
-        list.majorant = std::min(list.majorant, majorant);
         const double own = cost(size, n, list.majorant);
         const bool crowded = n > 64 * CLUME_GROUP_SIZE && references < 4 * n;
         if (!crowded && (child_cost > 0.92 * own || static_cast<double>(references) > allowance * static_cast<double>(n)))

@@ -17,12 +17,10 @@ namespace clume {
 /// the cost of travelling through the media.
 struct CellCosts {
     double step = 18;        ///< entering a cell
-    double tentative = 16;   ///< one tentative collision, without its density
-    double density = 12;     ///< one group's density at a point
+    double tentative = 25;   ///< one tentative collision
     double chord = 45;       ///< one group's chords and free flights or depths
     double null_share = 1;   ///< rays that sample by null collisions (0..1)
     double chord_share = 0;  ///< rays that visit every chord (decomposition, analytic transmittance)
-    double reference = 4;    ///< each primitive reference kept, against the whole: limits duplication
 };
 
 struct Cells {
@@ -33,7 +31,8 @@ struct Cells {
     std::vector<std::uint32_t> table;                ///< layout.h, CELL_*
     struct Leaf {
         std::vector<std::uint32_t> primitives;       ///< ascending
-        double majorant = 0;
+        std::vector<float> bounds;                   ///< of each one's extinction in this cell
+        double majorant = 0;                         ///< their sum
     };
     std::vector<Leaf> leaves;
     std::size_t references = 0;                      ///< primitives over all leaves

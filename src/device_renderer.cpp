@@ -9,7 +9,7 @@ namespace clume {
 namespace {
 
 constexpr std::size_t kLocalSize = 8;
-constexpr unsigned kFirstBatchArg = 11;  // after the scene's buffers
+constexpr unsigned kFirstBatchArg = 13;  // after the scene's buffers
 
 }  // namespace
 
@@ -23,6 +23,8 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
       params_(queue_, std::span(&scene.params, 1)),
       cells_(queue_, scene.cells),
       leaves_(queue_, scene.leaves),
+      references_(queue_, scene.references),
+      primitives_(queue_, scene.primitives),
       nodes_(queue_, scene.nodes),
       groups_(queue_, scene.groups),
       group_medium_(queue_, scene.group_medium),
@@ -39,7 +41,7 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
     options.define("CLUME_WIDTH", vector_width_of(info, vector_width));
     const cl::Program program = build_program(queue_, "render.cl", options);
     kernel_ = make_kernel(queue_, program, "render");
-    set_args(queue_, kernel_, 0, params_, cells_, leaves_, nodes_, groups_, group_medium_, media_, shading_, lights_, texels_, alias_, pixels_);
+    set_args(queue_, kernel_, 0, params_, cells_, leaves_, references_, primitives_, nodes_, groups_, group_medium_, media_, shading_, lights_, texels_, alias_, pixels_);
     // Code is generated at the first launch: pay for it here, on nothing.
     if (!tiles.empty()) {
         states_ = Buffer<device::PathState>(queue_, kLocalSize);

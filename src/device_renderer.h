@@ -38,6 +38,8 @@ private:
     Buffer<device::RenderParams> params_;
     Buffer<device::uint> cells_;
     Buffer<device::CellLeaf> leaves_;
+    Buffer<device::Reference> references_;
+    Buffer<device::Primitive> primitives_;
     Buffer<device::BvhNode> nodes_;
     Buffer<float> groups_;
     Buffer<device::uint> group_medium_;

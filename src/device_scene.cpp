@@ -84,23 +84,78 @@ private:
     DeviceScene& out_;
 };
 
-void pack_cells(const Cells& cells, DeviceScene& out) {
+/// Alias table (Vose) over the bounds of a cell, into references[first, first + n).
+void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& ellipsoids, device::Reference* out) {
+    const std::size_t n = leaf.primitives.size();
+    std::vector<double> weight(n);
+    std::vector<device::uint> small, large;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double bound = static_cast<double>(leaf.bounds[i]);
+        weight[i] = bound * static_cast<double>(n) / leaf.majorant;
+        out[i] = {0xffffffffu, static_cast<device::uint>(i), leaf.primitives[i], static_cast<float>(ellipsoids[leaf.primitives[i]].sigma / bound)};
+        (weight[i] < 1 ? small : large).push_back(static_cast<device::uint>(i));
+    }
+    while (!small.empty() && !large.empty()) {
+        const device::uint s = small.back(), l = large.back();
+        small.pop_back();
+        out[s].threshold = static_cast<device::uint>(std::min(weight[s] * 0x1p32, 4294967295.0));
+        out[s].other = l;
+        weight[l] -= 1 - weight[s];
+        if (weight[l] < 1) {
+            large.pop_back();
+            small.push_back(l);
+        }
+    }
+}
+
+/// `with_groups`: for strategies that visit every chord; `with_references`: for null collisions.
+void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out) {
     out.cells = cells.table;
     out.leaves.resize(cells.leaves.size());
     GroupWriter writer(out.ellipsoids, out);
-    std::size_t groups = 0;
+    std::size_t groups = 0, references = 0;
     for (std::size_t i = 0; i < cells.leaves.size(); ++i) {
-        const std::size_t n = writer.count(cells.leaves[i].primitives);
-        // An upper bound for the device's float sum, too: rounding of at most some hundred additions.
-        const auto majorant = static_cast<float>(cells.leaves[i].majorant * (1 + 1e-5 + 1e-7 * static_cast<double>(n)));
-        out.leaves[i] = {static_cast<device::uint>(groups), static_cast<device::uint>(n), majorant, static_cast<float>(1.0 / static_cast<double>(majorant))};
-        groups += n;
+        const Cells::Leaf& leaf = cells.leaves[i];
+        device::CellLeaf& l = out.leaves[i];
+        l = {};
+        if (with_groups) {
+            l.first_group = static_cast<device::uint>(groups);
+            l.group_count = static_cast<device::uint>(writer.count(leaf.primitives));
+            groups += l.group_count;
+        }
+        if (with_references) {
+            l.first_reference = static_cast<device::uint>(references);
+            l.reference_count = static_cast<device::uint>(leaf.primitives.size());
+            l.majorant = static_cast<float>(leaf.majorant);
+            l.inverse_majorant = static_cast<float>(1.0 / leaf.majorant);
+            references += leaf.primitives.size();
+        }
     }
-    if (groups > 0x7fffffffu) throw RenderError("the cells need more than 2^31 groups");
+    if (std::max(groups, references) > 0x7fffffffu) throw RenderError("the cells need more than 2^31 references");
     writer.resize(groups);
+    out.references.resize(references);
     parallel_chunks(cells.leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) writer.write(out.leaves[i].first_group, cells.leaves[i].primitives);
+        for (std::size_t i = begin; i < end; ++i) {
+            if (with_groups) writer.write(out.leaves[i].first_group, cells.leaves[i].primitives);
+            if (with_references) pack_references(cells.leaves[i], out.ellipsoids, out.references.data() + out.leaves[i].first_reference);
+        }
     });
+    if (with_references) {
+        out.primitives.resize(out.ellipsoids.size());
+        parallel_chunks(out.ellipsoids.size(), 4096, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                const Ellipsoid& e = out.ellipsoids[i];
+                device::Primitive& p = out.primitives[i];
+                p = {};
+                for (int k = 0; k < 3; ++k) p.mu[k] = static_cast<float>(e.center[k]);
+                for (int k = 0; k < 6; ++k) p.w[k] = static_cast<float>(e.w[k]);
+                p.sigma = static_cast<float>(e.sigma);
+                p.extent_squared = static_cast<float>(e.extent * e.extent);
+                p.family = family_bit(e.family);
+                p.medium = e.medium;
+            }
+        });
+    }
     device::RenderParams& p = out.params;
     p.cells_origin = pack(cells.origin, 1.0 / cells.root_size);
     p.cells_x = cells.roots.x;
@@ -221,14 +276,15 @@ Normalization normalize(const Scene& scene) {
 }
 
 std::uint64_t DeviceScene::byte_size() const {
-    return sizeof(params) + 4 * cells.size() + sizeof(device::CellLeaf) * leaves.size() + sizeof(device::BvhNode) * nodes.size() +
+    return sizeof(params) + 4 * cells.size() + sizeof(device::CellLeaf) * leaves.size() + sizeof(device::Reference) * references.size() +
+           sizeof(device::Primitive) * primitives.size() + sizeof(device::BvhNode) * nodes.size() +
            4 * groups.size() + 4 * group_medium.size() + sizeof(device::MediumInfo) * media.size() + 16 * shading.size() +
            sizeof(device::LightInfo) * lights.size() + 16 * texels.size() + sizeof(device::AliasEntry) * alias.size();
 }
 
 std::string DeviceScene::hash() const {
     std::string all = sha256_hex(std::as_bytes(std::span(&params, 1)));
-    all += hash_of(cells) + hash_of(leaves) + hash_of(nodes) + hash_of(groups) + hash_of(group_medium) + hash_of(media);
+    all += hash_of(cells) + hash_of(leaves) + hash_of(references) + hash_of(primitives) + hash_of(nodes) + hash_of(groups) + hash_of(group_medium) + hash_of(media);
     all += hash_of(shading) + hash_of(lights) + hash_of(texels) + hash_of(alias);
     return sha256_hex(all);
 }
@@ -240,11 +296,9 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     const LightMasks lights = add_lights(scene, out);
     const RenderSettings& r = scene.render;
 
-    const bool bvh = options.accelerator == "bvh";
     // Measured (docs/design.md): null collisions under the cells' bounds are the fastest unbiased choice on every benchmark scene.
-    out.strategy = r.strategy != "auto" ? r.strategy : bvh ? "decomposition" : "delta";
+    out.strategy = r.strategy != "auto" ? r.strategy : "delta";
     out.transmittance = "analytic";
-    if (bvh && out.strategy == "delta") throw RenderError("strategy delta needs the cells' bounds: it does not run on the bvh");
 
     const auto start = std::chrono::steady_clock::now();
     out.ellipsoids = make_ellipsoids(scene, out.normalization);
@@ -252,20 +306,25 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     out.params.bounds_min = pack(bounds.lo);
     out.params.bounds_max = pack(bounds.hi);
     const BvhTree tree = build_bvh(out.ellipsoids);
+    // Null collisions fly through cells with bounds; everything that sums or inverts chords visits groups, kept by the cells
+    // or by the bvh.
+    const bool delta = out.strategy == "delta", chords = !delta || lights.nee;
+    const bool bvh = options.accelerator == "bvh" || (options.accelerator == "auto" && delta && chords);
     std::uint32_t stack = 0;
     std::string accelerator;
-    if (bvh) {
-        pack_bvh(tree, out, stack);
-        accelerator = fmt::format("8-wide bvh, {} nodes, {} groups", out.nodes.size(), out.group_medium.size());
-    } else {
+    if (delta || !bvh) {
         CellCosts costs;
-        costs.null_share = out.strategy == "decomposition" ? 0 : 1;
-        costs.chord_share = out.strategy == "decomposition" ? 1 : lights.nee ? 0.5 : 0;
+        costs.null_share = delta ? 1 : 0;
+        costs.chord_share = bvh || !chords ? 0 : 1;
         const std::size_t n = out.ellipsoids.size();
         const Cells cells = build_cells(out.ellipsoids, tree, costs, std::max<std::size_t>(std::size_t{2} << 20, 10 * n));
-        pack_cells(cells, out);
+        pack_cells(cells, chords && !bvh, delta, out);
         accelerator = fmt::format("{}x{}x{} cells, {} octree levels, {} leaves, {:.1f} references per primitive", cells.roots.x, cells.roots.y,
                                   cells.roots.z, cells.levels, cells.leaves.size(), n ? static_cast<double>(cells.references) / static_cast<double>(n) : 0.0);
+    }
+    if (bvh) {
+        pack_bvh(tree, out, stack);
+        accelerator += fmt::format("{}8-wide bvh, {} nodes, {} groups", accelerator.empty() ? "" : "; ", out.nodes.size(), out.group_medium.size());
     }
     out.accelerator_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
@@ -316,6 +375,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     define("CLUME_STRATEGY", out.strategy == "delta" ? 2 : out.strategy == "march" ? 3 : 1);
     define("CLUME_ACCEL", bvh ? 2 : 1);
     if (bvh) define("CLUME_BVH_STACK", stack);
+    if (!out.cells.empty()) define("CLUME_CELL_LEVELS", out.params.cells_levels);
 
     const auto say = [&](const char* feature, std::string what) { out.explain.emplace_back(feature, std::move(what)); };
     const std::initializer_list<const char*> kinds = {"constant", "envmap", "point", "spot", "directional", "sphere", "rectangle"};

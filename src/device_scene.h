@@ -19,6 +19,8 @@ struct DeviceScene {
     device::RenderParams params{};
     std::vector<device::uint> cells;
     std::vector<device::CellLeaf> leaves;
+    std::vector<device::Reference> references;
+    std::vector<device::Primitive> primitives;
     std::vector<device::BvhNode> nodes;
     std::vector<float> groups;
     std::vector<device::uint> group_medium;

@@ -29,7 +29,7 @@ struct RenderOptions {
     std::optional<double> time_limit_s;        ///< stop handing out batches after this long; the image holds what was done
     std::uint32_t batch_samples = 0;           ///< samples of a pixel per batch; 0: sized to 100–200 ms by measurement
     int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own
-    std::string accelerator = "cells";         ///< "cells" or "bvh" (decomposition, analytic and march only)
+    std::string accelerator = "auto";          ///< of what visits chords (decomposition, analytic, march): "cells", "bvh" or "auto"
 };
 
 /// What was rendered; arrays cover the crop window, row 0 on top.
