@@ -6,7 +6,7 @@
 //   params   RenderParams            one
 //   groups   float[176]              per group of 16 primitives: 11 rows of 16 (CLUME_ROW_*), padded lanes far away with sigma 0
 //   group_medium uint                per group: index into media
-//   cells    uint                    root cells, x fastest, then blocks of 8 children; see CELL_* below
+//   cells    CellEntry               root cells, x fastest, then blocks of 8 children
 //   leaves   CellLeaf                per non-empty cell
 //   references Reference             per (cell, primitive): an alias table over the cell's bounds, for null collisions
 //   primitives Primitive             per primitive, one cache line
@@ -42,7 +42,7 @@ struct alignas(16) float4 {
 #define CLUME_ROW_ID 10
 #define CLUME_NO_PRIMITIVE 0xffffffffu
 
-// A cell entry: below CELL_EMPTY_MAX an empty cell, the number being the distance in root cells (Chebyshev) within which
+// CellEntry.link: below CELL_EMPTY_MAX an empty cell, the number being the distance in root cells (Chebyshev) within which
 // all is empty; with CELL_INNER set, the index of a block of 8 children; else CELL_EMPTY_MAX + the leaf's index.
 #define CELL_EMPTY_MAX 64u
 #define CELL_INNER 0x80000000u
@@ -89,11 +89,14 @@ typedef struct RenderParams {
     uint pad0, pad1;
 } RenderParams;
 
+typedef struct CellEntry {
+    uint link;
+    float majorant;  // sum of the references' bounds; 0 if empty
+} CellEntry;
+
 typedef struct CellLeaf {
     uint first_group, group_count;          // decomposition, analytic transmittance, march; else 0
     uint first_reference, reference_count;  // delta; else 0
-    float majorant, inverse_majorant;       // sum of the references' bounds
-    uint pad0, pad1;
 } CellLeaf;
 
 // One primitive of a cell: it collides here at the rate bound · K(r²) · scale, its bound's share of the cell's majorant
@@ -149,7 +152,7 @@ typedef struct PathState {
 } PathState;
 
 #ifdef __cplusplus
-static_assert(sizeof(RenderParams) == 240 && sizeof(CellLeaf) == 32 && sizeof(Reference) == 16 && sizeof(Primitive) == 64 && sizeof(BvhNode) == 224 && sizeof(MediumInfo) == 16);
+static_assert(sizeof(RenderParams) == 240 && sizeof(CellEntry) == 8 && sizeof(CellLeaf) == 16 && sizeof(Reference) == 16 && sizeof(Primitive) == 64 && sizeof(BvhNode) == 224 && sizeof(MediumInfo) == 16);
 static_assert(sizeof(LightInfo) == 144 && sizeof(AliasEntry) == 16 && sizeof(PathState) == 80);
 }  // namespace clume::device
 #endif

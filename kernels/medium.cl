@@ -4,7 +4,7 @@
 #include "cells.cl"
 
 #define SCENE_ARGS                                                                                                    \
-    __constant const RenderParams *params, __global const uint *cells, __global const CellLeaf *leaves,               \
+    __constant const RenderParams *params, __global const CellEntry *cells, __global const CellLeaf *leaves,               \
         __global const Reference *references, __global const Primitive *primitives, __global const BvhNode *nodes,    \
         __global const float *groups, __global const uint *group_medium, __global const MediumInfo *media,            \
         __global const float4 *shading, __global const LightInfo *lights, __global const float4 *texels,              \

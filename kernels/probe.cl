@@ -48,13 +48,13 @@ __kernel void probe_group(__global const float* groups, __global const float4* r
     }
 }
 
-/// Ray i: free flight by the program's strategy up to t_end (in the origin's w): out t (CLUME_INFINITY if it escapes),
+/// Ray i, two float4: origin with t_end, direction. Free flight by the program's strategy up to t_end: out t (CLUME_INFINITY if it escapes),
 /// primitive (as_uint), transmittance to t_end, groups evaluated (as_uint). what: 1 flight, 2 transmittance, 3 both.
-__kernel void probe_ray(SCENE_ARGS, __global const float4* origin, __global const float4* direction, __global float4* out, uint count, uint sample, uint what) {
+__kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4* out, uint count, uint sample, uint what) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
-    const float3 o = origin[i].xyz, d = direction[i].xyz;
-    const float t_end = origin[i].w;
+    const float3 o = rays[2 * i].xyz, d = rays[2 * i + 1].xyz;
+    const float t_end = rays[2 * i].w;
     float4 r = (float4)(CLUME_INFINITY, as_float(CLUME_NO_PRIMITIVE), 1.0f, 0.0f);
     if (what & 1u) {
         Draws draws = {sample, i, 1, (uint2)(params->seed_lo, params->seed_hi)};
@@ -72,14 +72,14 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* origin, __global cons
     out[i] = r;
 }
 
-/// Camera rays of whole pixels' samples: origin and direction.
-__kernel void probe_camera(SCENE_ARGS, __global const uint* pixels, __global float4* origin, __global float4* direction, uint count, uint sample) {
+/// Camera rays of pixels' samples, as probe_ray takes them.
+__kernel void probe_camera(SCENE_ARGS, __global const uint* pixels, __global float4* rays, uint count, uint sample) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
     Path p;
     path_begin(&p, pixels[i], sample, params);
-    origin[i] = (float4)(p.o, CLUME_INFINITY);
-    direction[i] = (float4)(p.d, 0.0f);
+    rays[2 * i] = (float4)(p.o, CLUME_INFINITY);
+    rays[2 * i + 1] = (float4)(p.d, 0.0f);
 }
 
 /// Phase function i: in: g, cosine to evaluate, unused; out: value at the cosine, then a sampled direction's cosine, its pdf.

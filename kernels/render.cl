@@ -64,6 +64,10 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
         s.flags = p.flags;
         states[item] = s;
         atomic_inc(unfinished);
+    } else {
+        // Others may go on in a launch to come: there this one must find itself done.
+        states[item].sample = p.sample;
+        states[item].flags = 0;
     }
     __global ulong* out = sums + (size_t)item * FILM_WORDS;
     for (int i = 0; i < FILM_WORDS; ++i) {

@@ -32,7 +32,8 @@ static uint uniform_index(uint x, uint n) { return (uint)(((ulong)x * n) >> 32);
 /// Uniform in (0, 1): (x + 1/2) 2^-32 rounded to float, kept below 1.
 static float uniform_s(uint x) { return min_s((from_uint_s(x) + 0.5f) * 0x1p-32f, 0x1.fffffep-1f); }
 
-/// 32 random bits per primitive id under a 64-bit key: a bijective mixer (three multiply-xorshift rounds).
+/// 32 random bits per primitive id under a 64-bit key: a bijective mixer (three multiply-xorshift rounds). Keys are words of
+/// `philox`; ones that differ in a bit of y alone would not do.
 static vuint primitive_bits(vuint id, uint2 key) {
     vuint x = id * (vuint)0x9E3779B9u ^ (vuint)key.x;
     x = (x ^ (x >> (vuint)16)) * (vuint)0x7feb352du;

@@ -56,7 +56,7 @@ __kernel void probe_math(__global const float* x, __global const float* y, __glo
         case PROBE_ERFC: r = erfc_v(a); break;
         case PROBE_ERFC_INVERSE: r = erfc_inverse_v(a); break;
         case PROBE_EPANECHNIKOV_INVERSE: r = epanechnikov_inverse_v(a); break;
-        case PROBE_ERF_BETWEEN: r = erf_between(a, b); break;
+        case PROBE_ERF_BETWEEN: r = erf_between(a, b, b - a); break;
         case PROBE_FROM_UINT: r = from_uint_v(as_vuint(a)); break;
         default: break;
     }

@@ -7,8 +7,8 @@
 #include "medium.cl"
 
 /// Kernel value K(r²) of one primitive at p, 0 outside its support.
-static float primitive_kernel(__global const Primitive* q, float3 p) {
-    const float x = p.x - q->mu[0], y = p.y - q->mu[1], z = p.z - q->mu[2];
+static float primitive_kernel(__global const Primitive* q, float px, float py, float pz) {
+    const float x = px - q->mu[0], y = py - q->mu[1], z = pz - q->mu[2];
     const float a0 = fma(q->w[0], x, fma(q->w[1], y, q->w[2] * z)), a1 = fma(q->w[3], y, q->w[4] * z), a2 = q->w[5] * z;
     const float r2 = fma(a0, a0, fma(a1, a1, a2 * a2));
 #if CLUME_ONE_MEDIUM
@@ -34,30 +34,29 @@ static int flight_delta(float3 o, float3 d, float t_end, Flight* f, const Draws*
     uint draw = f->draw;
     const uint pause = draw + CLUME_FLIGHT_DRAWS;
     // Words of a tentative collision: depth to it, slot of the alias table, threshold, acceptance.
-    uint4 bits = draw_bits(r, draw);
-    float tau = exponential_s(bits.x);
+    const uint4 first = draw_bits(r, draw);
+    uint slot_bits = first.y, threshold_bits = first.z, accept_bits = first.w;
+    float tau = exponential_s(first.x);
     do {
-        if (w.entry < CELL_EMPTY_MAX) continue;
-        __global const CellLeaf* leaf = leaves + (w.entry - CELL_EMPTY_MAX);
-        const float majorant = leaf->majorant, inverse_majorant = leaf->inverse_majorant;
-        const float end = min_s(w.t_exit, w.t_end);
         float t = w.t;
+        const float end = min_s(w.t_exit, w.t_end);
         for (;;) {
-            const float next = fma(tau, inverse_majorant, t);
-            if (!(next < end)) {
-                tau = max_s(fma(t - end, majorant, tau), 0.0f);
+            const float depth = w.majorant * (end - t);
+            if (!(tau < depth)) {
+                tau -= depth;
                 break;
             }
-            t = next;
-            __global const Reference* list = references + leaf->first_reference;
-            const uint slot = uniform_index(bits.y, leaf->reference_count);
-            const uint chosen = bits.z < list[slot].threshold ? slot : list[slot].other;
+            t = min_s(fma(tau, rcp_s(w.majorant), t), end);
+            const CellLeaf leaf = leaves[w.link - CELL_EMPTY_MAX];
+            __global const Reference* list = references + leaf.first_reference;
+            const uint slot = uniform_index(slot_bits, leaf.reference_count);
+            const uint chosen = threshold_bits < list[slot].threshold ? slot : list[slot].other;
             const uint primitive = list[chosen].primitive;
-            const float probability = primitive_kernel(primitives + primitive, along_s(o, d, t)) * list[chosen].scale;
+            const float probability = primitive_kernel(primitives + primitive, fma(t, d.x, o.x), fma(t, d.y, o.y), fma(t, d.z, o.z)) * list[chosen].scale;
             f->violations += probability > 1.0f ? 1u : 0u;
             f->work += 1u;
             draw += 1;
-            if (uniform_s(bits.w) < probability) {
+            if (uniform_s(accept_bits) < probability) {
                 f->primitive = primitive;
                 f->t = t;
                 return FLIGHT_COLLIDED;
@@ -67,9 +66,12 @@ static int flight_delta(float3 o, float3 d, float t_end, Flight* f, const Draws*
                 f->draw = draw;
                 return FLIGHT_PAUSED;
             }
-            bits = draw_bits(r, draw);
+            const uint4 bits = draw_bits(r, draw);
+            slot_bits = bits.y;
+            threshold_bits = bits.z;
+            accept_bits = bits.w;
             tau = exponential_s(bits.x);
         }
-    } while (cells_next(&w, cells));
+    } while (cells_next(&w, params, cells));
     return FLIGHT_ESCAPED;
 }

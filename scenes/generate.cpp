@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Makes the files of the shipped scenes: plume.ply, fire.ply, cloud.ply and sky.exr, into the folder given.
-// The same bytes everywhere: own random numbers, no std distributions, no contraction, and every value is rounded to 16
-// significant bits, so that last-bit differences between maths libraries don't show. Sizes are support radii in world
-// units; files hold natural logs of scales, and what a scale is to a support radius depends on the kernel (extent).
+// The same bytes everywhere: own random numbers, no std distributions, no two draws in one expression (their order would be
+// the compiler's), and every value is rounded to 16 significant bits, so that last-bit differences between maths libraries
+// don't show. Sizes are support radii in world units; files hold natural logs of scales (support radius / extent).
 #include <ImfArray.h>
 #include <ImfRgbaFile.h>
 
@@ -61,7 +61,8 @@ class Swirl {
     Swirl(std::uint64_t seed, double frequency) {
         Random random(seed);
         for (Wave& w : waves_) {
-            w.k = random.direction() * frequency * std::exp(random.uniform(-0.7, 0.7));
+            const double detail = std::exp(random.uniform(-0.7, 0.7));
+            w.k = random.direction() * frequency * detail;
             w.a = glm::normalize(glm::cross(w.k, random.direction())) * std::sqrt(2.0 / static_cast<double>(waves_.size()));
             w.phase = random.uniform(0, 2 * pi);
         }
@@ -101,10 +102,10 @@ dquat along(const dvec3& direction, double roll) {
 }
 
 struct Growth {
-    int tries;                     ///< candidates on each parent
-    double smallest, largest;      ///< radius of a child over its parent's
-    double spacing;                ///< least distance of two children over the sum of their radii
-    double gap;                    ///< share of the surface left bare, in patches
+    int tries;                 ///< candidates on each parent
+    double smallest, largest;  ///< radius of a child over its parent's
+    double spacing;            ///< least distance of two children over the sum of their radii
+    double gap;                ///< share of the surface left bare, in patches
     double sigma_t;
 };
 
@@ -119,16 +120,17 @@ void grow(std::vector<Puff>& puffs, const Growth& how, const Swirl& swirl, Rando
         for (int k = 0; k < how.tries; ++k) {
             const dvec3 on_ball = random.direction();
             const double size = parent.radius() * random.uniform(how.smallest, how.largest);
-            const double sink = random.uniform(0.72, 0.92), stretch = std::exp(random.uniform(0.0, 0.35)), roll = random.uniform(0, 2 * pi);
+            const double sink = random.uniform(0.72, 0.92), stretch = std::exp(random.uniform(0.0, 0.35)),
+                         roll = random.uniform(0, 2 * pi);
             Puff child;
             child.center = parent.center + parent.rotation * (parent.radii * on_ball * sink);
             if (swirl(child.center * 1.7).y < how.gap) continue;
-            const bool buried = std::any_of(puffs.begin(), puffs.begin() + static_cast<std::ptrdiff_t>(parents), [&](const Puff& p) {
-                return p.level_set(child.center) < 1 - 0.6 * size / p.radius() && p.radius() > size;
-            });
-            const bool crowded = std::any_of(puffs.begin() + static_cast<std::ptrdiff_t>(parents), puffs.end(), [&](const Puff& p) {
-                return glm::distance(p.center, child.center) < how.spacing * (p.radius() + size);
-            });
+            const bool buried = std::any_of(
+                puffs.begin(), puffs.begin() + static_cast<std::ptrdiff_t>(parents),
+                [&](const Puff& p) { return p.level_set(child.center) < 1 - 0.6 * size / p.radius() && p.radius() > size; });
+            const bool crowded = std::any_of(
+                puffs.begin() + static_cast<std::ptrdiff_t>(parents), puffs.end(),
+                [&](const Puff& p) { return glm::distance(p.center, child.center) < how.spacing * (p.radius() + size); });
             if (buried || crowded) continue;
             child.radii = size * dvec3(stretch, 1.0, 1 / stretch);
             child.rotation = along(swirl(child.center) + dvec3(0, 0.6, 0), roll);
@@ -166,17 +168,28 @@ std::vector<Puff> make_plume() {
         double y, radius, tube;
         int count;
     };
-    constexpr std::array<Ring, 11> rings{{{-0.25, 0.26, 0.34, 6}, {0.1, 0.2, 0.28, 6}, {0.5, 0.2, 0.3, 6}, {0.95, 0.27, 0.34, 6},
-        {1.4, 0.3, 0.36, 7}, {1.85, 0.34, 0.42, 7}, {2.3, 0.42, 0.44, 8}, {2.75, 0.62, 0.52, 9}, {3.15, 0.82, 0.52, 11},
-        {3.5, 0.62, 0.55, 8}, {3.8, 0.25, 0.5, 4}}};
+    constexpr std::array<Ring, 11> rings{{{-0.25, 0.26, 0.34, 6},
+                                          {0.1, 0.2, 0.28, 6},
+                                          {0.5, 0.2, 0.3, 6},
+                                          {0.95, 0.27, 0.34, 6},
+                                          {1.4, 0.3, 0.36, 7},
+                                          {1.85, 0.34, 0.42, 7},
+                                          {2.3, 0.42, 0.44, 8},
+                                          {2.75, 0.62, 0.52, 9},
+                                          {3.15, 0.82, 0.52, 11},
+                                          {3.5, 0.62, 0.55, 8},
+                                          {3.8, 0.25, 0.5, 4}}};
     Random random(2024);
     const Swirl swirl(7, 3.0);
-    const auto axis = [](double y) { return dvec3(0.05 * y * y - 0.1 + 0.1 * std::sin(1.9 * y), y, 0.08 * std::sin(1.3 * y + 1)); };
+    const auto axis = [](double y) {
+        return dvec3(0.05 * y * y - 0.1 + 0.1 * std::sin(1.9 * y), y, 0.08 * std::sin(1.3 * y + 1));
+    };
     std::vector<Puff> puffs;
     const auto lobe = [&](const dvec3& at, double size) {
         Puff p;
         p.center = at;
-        p.radii = size * dvec3(random.uniform(0.9, 1.25), 1.0, random.uniform(0.8, 1.0));
+        const double thin = random.uniform(0.8, 1.0), wide = random.uniform(0.9, 1.25);
+        p.radii = size * dvec3(wide, 1.0, thin);
         p.rotation = along(swirl(at) + dvec3(0, 0.8, 0), random.uniform(0, 2 * pi));
         p.sigma_t = 14;
         puffs.push_back(p);
@@ -185,7 +198,8 @@ std::vector<Puff> make_plume() {
         const double turn = random.uniform(0, 2 * pi);
         lobe(axis(ring.y), ring.radius + 0.5 * ring.tube);
         for (int i = 0; i < ring.count; ++i) {
-            const double phi = turn + 2 * pi * (i + random.uniform(-0.3, 0.3)) / ring.count, out = ring.radius * random.uniform(0.75, 1.25);
+            const double phi = turn + 2 * pi * (i + random.uniform(-0.3, 0.3)) / ring.count,
+                         out = ring.radius * random.uniform(0.75, 1.25);
             const double y = ring.y + ring.tube * random.uniform(-0.55, 0.55);
             lobe(axis(y) + dvec3(out * std::cos(phi), 0, out * std::sin(phi)), ring.tube * random.uniform(0.65, 1.2));
         }
@@ -204,31 +218,45 @@ std::vector<Puff> make_plume() {
 }
 
 /// The hue of a glowing body, hottest first: white-yellow, orange, deep red.
-dvec3 glow(double heat) {
-    return {2.6 * smooth(0.0, 0.55, heat), 1.7 * smooth(0.12, 1.05, heat), 0.75 * smooth(0.45, 1.25, heat)};
-}
+dvec3 glow(double heat) { return {1.6 * smooth(0.0, 0.6, heat), 1.1 * smooth(0.12, 1.05, heat), 0.5 * smooth(0.5, 1.2, heat)}; }
 
 /// A fire on a bed of about unit width: tongues are streamlines of a rising, narrowing, ever more turbulent flow.
 std::vector<Puff> make_fire() {
     Random random(451);
     const Swirl swirl(11, 3.2), fine(12, 8.5);
     std::vector<Puff> puffs;
-    for (int tongue = 0; tongue < 300; ++tongue) {
-        const double phi = random.uniform(0, 2 * pi), out = 0.55 * std::sqrt(random.uniform());
-        dvec3 at(out * std::cos(phi), random.uniform(0.0, 0.12), out * std::sin(phi));
-        const double life = (1.25 - 1.1 * out) * random.uniform(0.55, 1.35), width = random.uniform(0.05, 0.1);
-        const int steps = 8 + static_cast<int>(14 * life);
+    struct Flame {
+        dvec3 root;
+        double height, share;
+    };
+    constexpr std::array<Flame, 6> flames{{{{0, 0, 0}, 1.45, 0.3},
+                                           {{-0.3, 0, 0.08}, 1.0, 0.5},
+                                           {{0.32, 0, -0.05}, 1.15, 0.68},
+                                           {{0.12, 0, -0.28}, 0.85, 0.8},
+                                           {{-0.5, 0, -0.1}, 0.55, 0.9},
+                                           {{0.52, 0, 0.05}, 0.6, 1.0}}};
+    for (int tongue = 0; tongue < 320; ++tongue) {
+        const double pick = (tongue + 0.5) / 320;
+        const Flame& flame = *std::find_if(flames.begin(), flames.end(), [&](const Flame& f) { return pick < f.share; });
+        const double phi = random.uniform(0, 2 * pi), out = std::sqrt(random.uniform());
+        const dvec3 side(std::cos(phi), 0, std::sin(phi));
+        dvec3 at = flame.root + side * (0.1 * out) + dvec3(0, 0.1 * flame.root.x * flame.root.x + random.uniform(0.0, 0.16), 0);
+        const double life = flame.height * (1.3 - 0.6 * out) * random.uniform(0.6, 1.25), width = random.uniform(0.035, 0.07);
+        const int steps = 8 + static_cast<int>(12 * life);
         for (int s = 0; s < steps; ++s) {
             const double t = (s + 0.5) / steps;
-            const dvec3 inward(-at.x, 0, -at.z);
-            const dvec3 v = dvec3(0, 1, 0) + inward * (0.9 * (1 - t)) + swirl(at - dvec3(0, 0.3, 0)) * (0.15 + 0.55 * at.y) + fine(at) * (0.1 + 0.35 * at.y);
-            const double step = 1.9 * life / steps, thick = width * (0.35 + 1.3 * t) * std::sqrt(1.02 - t) * 1.5;
+            const dvec3 inward = (flame.root - at) * dvec3(1, 0, 1);  // a flame swells, then narrows
+            const dvec3 v = dvec3(0, 0.45 + 0.55 * smooth(0, 0.3, t), 0) + side * (out * 0.75 * (1 - smooth(0.05, 0.4, t))) +
+                            inward * (1.6 * smooth(0.2, 0.6, t)) + swirl(at) * (0.1 + 0.3 * at.y) +
+                            fine(at) * (0.1 + 0.4 * at.y);
+            const double step = 1.7 * life / steps, thick = width * 2.2 * std::sqrt((t + 0.05) * (1.02 - t)) + 0.004;
             Puff p;
             p.center = at + v * (step / 2);
-            p.radii = {1.3 * step * glm::length(v), thick, 0.55 * thick};
+            p.radii = {1.5 * step * std::max(0.5, glm::length(v)), 1.6 * thick, 0.8 * thick};
             p.rotation = along(v, phi + 2.5 * t);
-            const double heat = std::clamp(1.2 - 0.62 * at.y / (0.45 + 0.75 * life) - 0.55 * t * t - 0.5 * out + 0.12 * random.bell(), 0.12, 1.25);
-            p.sigma_t = 5.5 * (0.35 + 0.65 * heat) * smooth(-0.05, 0.15, t);
+            const double heat = std::clamp(
+                1.12 - 0.55 * at.y / (0.35 + 0.55 * life) - 0.35 * t * t - 0.3 * out + 0.1 * random.bell(), 0.14, 1.2);
+            p.sigma_t = 8 * (0.3 + 0.7 * heat);
             p.albedo = dvec3(0.12);
             p.emission = glow(heat);
             puffs.push_back(p);
@@ -236,7 +264,8 @@ std::vector<Puff> make_fire() {
         }
     }
     for (int i = 0; i < 420; ++i) {  // smoke, darker than the flames it rolls off
-        dvec3 at(0.25 * random.bell(), random.uniform(1.0, 1.7), 0.25 * random.bell());
+        const double z = 0.2 * random.bell(), y = random.uniform(1.1, 1.8), x = 0.2 * random.bell();
+        dvec3 at(x, y, z);
         const int steps = static_cast<int>(random.uniform() * 24);
         for (int s = 0; s < steps; ++s) at += (dvec3(0.12, 0.8, 0) + swirl(at * 0.8) * 0.55 + fine(at) * 0.2) * 0.09;
         Puff p;
@@ -249,17 +278,19 @@ std::vector<Puff> make_fire() {
         puffs.push_back(p);
     }
     for (int i = 0; i < 150; ++i) {  // sparks
-        dvec3 at(0.3 * random.bell(), random.uniform(0.2, 1.2), 0.3 * random.bell());
+        const double z = 0.3 * random.bell(), y = random.uniform(0.2, 1.2), x = 0.3 * random.bell();
+        dvec3 at(x, y, z);
         dvec3 v(0);
         const int steps = static_cast<int>(random.uniform() * 30);
         for (int s = 0; s <= steps; ++s) at += (v = dvec3(0, 0.9, 0) + swirl(at) * 0.7 + fine(at) * 0.5) * 0.06;
         Puff p;
         p.center = at;
-        p.radii = random.uniform(0.006, 0.012) * dvec3(random.uniform(1.0, 3.5), 1, 1);
+        const double stretch = random.uniform(1.0, 3.5), size = random.uniform(0.006, 0.012);
+        p.radii = size * dvec3(stretch, 1, 1);
         p.rotation = along(v, 0);
         p.sigma_t = 400;
         p.albedo = dvec3(0.1);
-        p.emission = dvec3(3.2, 1.1, 0.22) * random.uniform(0.4, 1.0);
+        p.emission = dvec3(2.2, 0.8, 0.15) * random.uniform(0.4, 1.0);
         puffs.push_back(p);
     }
     return puffs;
@@ -270,7 +301,7 @@ std::vector<Puff> make_cloud() {
     Random random(1803);  // Luke Howard named the clouds
     const Swirl swirl(21, 2.6);
     const dvec3 hollow(0.1, 0.62, 0);
-    const double hollow_radius = 0.2;
+    const double hollow_radius = 0.3;
     std::vector<Puff> puffs;
     const auto keep = [&](const Puff& p) {
         return p.center.y - 0.55 * p.radius() > -0.05 && glm::distance(p.center, hollow) > hollow_radius + p.radii.x;
@@ -278,11 +309,14 @@ std::vector<Puff> make_cloud() {
     for (int i = 0; puffs.size() < 90 && i < 4000; ++i) {
         Puff p;
         const double x = 0.8 * random.bell(), z = 0.42 * random.bell();
-        const double roof = 1.35 * std::exp(-0.9 * (x - 0.1) * (x - 0.1) - 1.8 * z * z) * (1 + 0.35 * swirl({x, 0.3, z}).x) + 0.15;
+        const double roof =
+            1.35 * std::exp(-0.9 * (x - 0.1) * (x - 0.1) - 1.8 * z * z) * (1 + 0.35 * swirl({x, 0.3, z}).x) + 0.15;
         const double size = random.uniform(0.2, 0.46) * (0.55 + 0.45 * std::min(1.0, roof));
         p.center = {x, random.uniform(0.4 * size, std::max(0.45 * size, roof)), z};
-        p.radii = size * dvec3(random.uniform(1.0, 1.3), 1.0, random.uniform(0.8, 1.0));
-        p.rotation = along({1, 0.2 * random.bell(), random.bell()}, random.uniform(0, 2 * pi));
+        const double thin = random.uniform(0.8, 1.0), wide = random.uniform(1.0, 1.3);
+        p.radii = size * dvec3(wide, 1.0, thin);
+        const double roll = random.uniform(0, 2 * pi), rise = 0.2 * random.bell(), turn = random.bell();
+        p.rotation = along({1, rise, turn}, roll);
         p.sigma_t = 4;
         if (std::abs(x) < 2 && keep(p)) puffs.push_back(p);
     }
@@ -301,11 +335,13 @@ float rounded(double value) {
     return static_cast<float>(std::ldexp(std::nearbyint(std::ldexp(fraction, 16)), exponent - 16));
 }
 
-void write_ply(const std::filesystem::path& path, const std::vector<Puff>& puffs, double extent, bool with_albedo, bool with_emission) {
+void write_ply(const std::filesystem::path& path, const std::vector<Puff>& puffs, double extent, bool with_albedo,
+               bool with_emission) {
     std::string names = "x y z scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 sigma_t";
     if (with_albedo) names += " albedo_0 albedo_1 albedo_2";
     if (with_emission) names += " emission_0 emission_1 emission_2";
-    std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(puffs.size()) + "\nproperty float ";
+    std::string bytes =
+        "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(puffs.size()) + "\nproperty float ";
     for (const char c : names) bytes += c == ' ' ? std::string("\nproperty float ") : std::string(1, c);
     bytes += "\nend_header\n";
     const auto put = [&](double value) {
@@ -322,7 +358,8 @@ void write_ply(const std::filesystem::path& path, const std::vector<Puff>& puffs
         if (with_emission) put_all(p.emission);
     }
     std::ofstream file(path, std::ios::binary);
-    if (!file.write(bytes.data(), static_cast<std::streamsize>(bytes.size())).flush()) throw std::runtime_error("cannot write " + path.string());
+    if (!file.write(bytes.data(), static_cast<std::streamsize>(bytes.size())).flush())
+        throw std::runtime_error("cannot write " + path.string());
     std::printf("%s: %zu ellipsoids, %zu bytes\n", path.c_str(), puffs.size(), bytes.size());
 }
 

@@ -10,7 +10,7 @@
 namespace clume {
 namespace {
 
-constexpr std::uint32_t kMaxLevels = 8;
+const std::uint32_t kMaxLevels = getenv("LV") ? atoi(getenv("LV")) : 8;
 constexpr std::size_t kMaxRoots = std::size_t{1} << 22;
 
 struct Cost {
@@ -145,7 +145,7 @@ double choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree& tr
         if (total < best_cost) best_cost = total, best_size = size;
         if (total > 3 * best_cost) break;
     }
-    return best_size;
+    return best_size * (getenv("RS") ? atof(getenv("RS")) : 1);
 }
 
 /// For each empty root, the Chebyshev distance to the nearest root that is not empty (or lies outside), capped.

@@ -28,7 +28,7 @@ struct Cells {
     double root_size = 1;
     glm::uvec3 roots{1};
     std::uint32_t levels = 0;                        ///< octree levels below the roots
-    std::vector<std::uint32_t> table;                ///< layout.h, CELL_*
+    std::vector<std::uint32_t> table;                ///< links: layout.h, CELL_*
     struct Leaf {
         std::vector<std::uint32_t> primitives;       ///< ascending
         std::vector<float> bounds;                   ///< of each one's extinction in this cell

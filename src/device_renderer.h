@@ -36,7 +36,7 @@ private:
     const std::vector<Tile>& tiles_;
     FilmSums& film_;
     Buffer<device::RenderParams> params_;
-    Buffer<device::uint> cells_;
+    Buffer<device::CellEntry> cells_;
     Buffer<device::CellLeaf> leaves_;
     Buffer<device::Reference> references_;
     Buffer<device::Primitive> primitives_;

@@ -110,7 +110,6 @@ void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& elli
 
 /// `with_groups`: for strategies that visit every chord; `with_references`: for null collisions.
 void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out) {
-    out.cells = cells.table;
     out.leaves.resize(cells.leaves.size());
     GroupWriter writer(out.ellipsoids, out);
     std::size_t groups = 0, references = 0;
@@ -126,10 +125,14 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
         if (with_references) {
             l.first_reference = static_cast<device::uint>(references);
             l.reference_count = static_cast<device::uint>(leaf.primitives.size());
-            l.majorant = static_cast<float>(leaf.majorant);
-            l.inverse_majorant = static_cast<float>(1.0 / leaf.majorant);
             references += leaf.primitives.size();
         }
+    }
+    out.cells.resize(cells.table.size());
+    for (std::size_t i = 0; i < cells.table.size(); ++i) {
+        const device::uint link = cells.table[i];
+        const bool leaf = !(link & CELL_INNER) && link >= CELL_EMPTY_MAX;
+        out.cells[i] = {link, leaf && with_references ? static_cast<float>(cells.leaves[link - CELL_EMPTY_MAX].majorant) : 0.0f};
     }
     if (std::max(groups, references) > 0x7fffffffu) throw RenderError("the cells need more than 2^31 references");
     writer.resize(groups);
@@ -276,7 +279,7 @@ Normalization normalize(const Scene& scene) {
 }
 
 std::uint64_t DeviceScene::byte_size() const {
-    return sizeof(params) + 4 * cells.size() + sizeof(device::CellLeaf) * leaves.size() + sizeof(device::Reference) * references.size() +
+    return sizeof(params) + sizeof(device::CellEntry) * cells.size() + sizeof(device::CellLeaf) * leaves.size() + sizeof(device::Reference) * references.size() +
            sizeof(device::Primitive) * primitives.size() + sizeof(device::BvhNode) * nodes.size() +
            4 * groups.size() + 4 * group_medium.size() + sizeof(device::MediumInfo) * media.size() + 16 * shading.size() +
            sizeof(device::LightInfo) * lights.size() + 16 * texels.size() + sizeof(device::AliasEntry) * alias.size();

@@ -17,7 +17,7 @@ namespace clume {
 struct DeviceScene {
     Normalization normalization;
     device::RenderParams params{};
-    std::vector<device::uint> cells;
+    std::vector<device::CellEntry> cells;
     std::vector<device::CellLeaf> leaves;
     std::vector<device::Reference> references;
     std::vector<device::Primitive> primitives;

@@ -67,7 +67,7 @@ struct Probe::Impl {
     Compiled& code;
     Queue& queue;
     Buffer<device::RenderParams> params;
-    Buffer<device::uint> cells;
+    Buffer<device::CellEntry> cells;
     Buffer<device::CellLeaf> leaves;
     Buffer<device::Reference> references;
     Buffer<device::Primitive> primitives;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
 #include <fmt/format.h>
 #include <memory>
 #include <thread>
@@ -132,6 +133,7 @@ RenderResult render(const Scene& scene, const RenderOptions& options, const std:
     stats.compile_s = seconds_since(compile_start);
 
     const auto start = Clock::now();
+    const std::clock_t cpu_start = std::clock();
     std::uint32_t empty_samples = end - begin;
     if (!tiles.empty() && end > begin) {
         DispatchOptions o;
@@ -155,6 +157,7 @@ RenderResult render(const Scene& scene, const RenderOptions& options, const std:
         stats.time_limited = report.stopped && !stop.load();
     }
     stats.render_s = seconds_since(start);
+    stats.cpu_s = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
     std::uint64_t active_paths = 0;
     stats.samples_min = tiles.empty() ? empty_samples : UINT32_MAX;
     for (std::size_t k = 0; k < pixels.size(); ++k) {
@@ -167,6 +170,7 @@ RenderResult render(const Scene& scene, const RenderOptions& options, const std:
     else empty_samples = stats.samples_max;
     stats.paths = active_paths + stats.empty_pixels * empty_samples;
     stats.nonfinite_samples = film.nonfinite();
+    stats.evaluations = film.work();
     stats.bound_violations = film.violations();
     if (stats.bound_violations > 0)
         stats.warnings.push_back(fmt::format("the density exceeded its bound {} times: please report this scene", stats.bound_violations));

@@ -56,9 +56,11 @@ struct RenderStats {
     std::uint64_t nonfinite_samples = 0;       ///< counted, added as 0
     std::uint64_t bound_violations = 0;        ///< density above its majorant; 0 unless a bound was wrong
     std::uint64_t primitives = 0;
+    std::uint64_t evaluations = 0;             ///< primitives (delta) or groups of 16 (else) evaluated in flights
     std::uint64_t device_bytes = 0;            ///< scene buffers on one device
     std::string layout_hash;                   ///< SHA-256 of the device buffers
     double build_s = 0, compile_s = 0, render_s = 0;
+    double cpu_s = 0;                          ///< of this process while rendering, all threads
     bool interrupted = false, time_limited = false;
     bool device_lost = false;                  ///< no device was left before the end; the image holds what was done
     std::uint32_t samples_min = 0, samples_max = 0;  ///< held per pixel

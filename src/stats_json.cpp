@@ -78,12 +78,14 @@ std::string stats_to_json(const RenderStats& stats) {
     put_member(out, "empty_pixels", stats.empty_pixels);
     put_member(out, "nonfinite_samples", stats.nonfinite_samples);
     put_member(out, "bound_violations", stats.bound_violations);
+    put_member(out, "evaluations", stats.evaluations);
     put_member(out, "primitives", stats.primitives);
     put_member(out, "device_bytes", stats.device_bytes);
     put_member(out, "layout_hash", stats.layout_hash);
     put_member(out, "build_s", stats.build_s);
     put_member(out, "compile_s", stats.compile_s);
     put_member(out, "render_s", stats.render_s);
+    put_member(out, "cpu_s", stats.cpu_s);
     put_member(out, "interrupted", stats.interrupted);
     put_member(out, "time_limited", stats.time_limited);
     put_member(out, "samples_min", stats.samples_min);

@@ -62,10 +62,10 @@ inline Estimate grey(int width, int height, const std::vector<double>& mean, con
     return e;
 }
 
-/// Of a share of samples: binomial, never taken as surer than one sample in n allows.
+/// Of a share of samples: binomial. One sample more per 16 pixels counts as noise, since a z-test can't judge a few events.
 inline Estimate share(int width, int height, const std::vector<double>& a, const std::vector<double>& n) {
     std::vector<double> variance;
-    for (std::size_t i = 0; i < a.size(); ++i) variance.push_back(n[i] > 0 ? a[i] * (1 - a[i]) / n[i] : 0);
+    for (std::size_t i = 0; i < a.size(); ++i) variance.push_back(n[i] > 0 ? a[i] * (1 - a[i]) / n[i] + 1 / (16 * n[i] * n[i]) : 0);
     return grey(width, height, a, variance);
 }
 
@@ -149,14 +149,14 @@ inline Light constant_light(const glm::dvec3& radiance, bool visible = false) {
     return l;
 }
 
-/// 16 × 8 texels of uneven colours; one is brighter than all others together.
+/// 16 × 8 texels of uneven colours; one, 1 % of the sphere, is 80 times brighter than the others.
 inline Light contrast_environment(bool visible, double rotate_y_rad) {
     Light l = light_of(LightKind::envmap);
     l.image.width = 16;
     l.image.height = 8;
     for (int i = 0; i < 128; ++i)
         for (int c = 0; c < 3; ++c) l.image.rgb.push_back(0.05f * static_cast<float>((i * (3 + 2 * c) + 5 * c) % 11));
-    for (int c = 0; c < 3; ++c) l.image.rgb[3 * (2 * 16 + 5) + static_cast<std::size_t>(c)] = 60.f - 15.f * static_cast<float>(c);
+    for (int c = 0; c < 3; ++c) l.image.rgb[3 * (2 * 16 + 5) + static_cast<std::size_t>(c)] = 20.f - 5.f * static_cast<float>(c);
     l.scale = 0.5;
     l.rotate_y_rad = rotate_y_rad;
     l.visible_to_camera = visible;

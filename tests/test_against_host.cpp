@@ -12,16 +12,17 @@ namespace {
 
 constexpr std::uint32_t spp = 256;
 
-void check_against_host(const std::string& name, const Scene& scene, const std::vector<Way>& ways, const RenderOptions& options = {}) {
+void check_against_host(const std::string& name, const Scene& scene, const std::vector<Way>& ways, const RenderOptions& options = {},
+                        std::uint32_t host_spp = spp) {
     std::optional<HostCrop> crop;
     if (options.crop) crop = HostCrop{options.crop->x0, options.crop->y0, options.crop->x1, options.crop->y1};
-    const HostImage host = HostTracer(scene, 32).trace(spp, 78, 2, crop);
+    const HostImage host = HostTracer(scene, 32).trace(host_spp, 78, 2, crop);
     REQUIRE(host.not_finite == 0);
     for (const Way& way : ways) {
         const RenderResult r = render_by(way, scene, spp, 0, options);
         check_clean(r);
         check_same(name + " by " + way.name(), colour_of(r.image), colour_of(host));
-        check_same(name + "_alpha by " + way.name(), alpha_of(r.image), alpha_of(host, spp));
+        check_same(name + "_alpha by " + way.name(), alpha_of(r.image), alpha_of(host, host_spp));
     }
 }
 
@@ -112,7 +113,7 @@ TEST_CASE("Media.FarAndLargeEqualsHost") {
 
 TEST_CASE("Media.DenseEqualsHost") {
     Scene scene = small(KernelFamily::gaussian, 12);
-    scene.media[0].density_scale = 40;
+    scene.media[0].density_scale = 12;
     scene.lights = {constant_light(glm::dvec3(1)), sun()};
     check_against_host("dense", scene, {delta, decomposition});
 }
@@ -125,9 +126,9 @@ TEST_CASE("Phases.EachEqualsHost") {
         check_against_host("henyey_greenstein", scene, {delta});
     }
     scene.lights = {contrast_environment(false, 0.3)};  // through MIS: sampling, density and value must agree
-    check_against_host("henyey_greenstein_mis", scene, {delta});
+    check_against_host("henyey_greenstein_mis", scene, {delta}, {}, 4 * spp);
     scene.media[0].phase = {PhaseKind::rayleigh, 0};
-    check_against_host("rayleigh_mis", scene, {delta});
+    check_against_host("rayleigh_mis", scene, {delta}, {}, 4 * spp);
     scene.lights = {sun()};
     check_against_host("rayleigh", scene, {delta});
 }
@@ -141,7 +142,7 @@ TEST_CASE("Phases.OwnParameterOfEachPrimitiveEqualsHost") {
     }
     scene.media[0].phase = {PhaseKind::henyey_greenstein, 0.4};
     scene.lights = {contrast_environment(false, 0.3)};
-    check_against_host("own_g_mis", scene, {delta});
+    check_against_host("own_g_mis", scene, {delta}, {}, 4 * spp);
     scene.media[0].phase = {};
     scene.lights = {sun()};
     check_against_host("own_g", scene, {decomposition_bvh});
@@ -180,7 +181,7 @@ TEST_CASE("Cameras.CropEqualsHost") {
     scene.lights = {contrast_environment(true, 2)};
     RenderOptions options;
     options.crop = CropWindow{5, 3, 21, 15};
-    check_against_host("crop", scene, {delta}, options);
+    check_against_host("crop", scene, {delta}, options, 4 * spp);
 }
 
 TEST_CASE("Background.IsSeenOnlyIfVisible") {

@@ -25,8 +25,9 @@ Scene mixture() {
     return scene;
 }
 
-void check_against_host(const std::string& name, Scene scene, const std::vector<LightSampling>& samplings, const Way& way = delta) {
-    const HostImage host = HostTracer(scene, 32).trace(spp, 77);
+void check_against_host(const std::string& name, Scene scene, const std::vector<LightSampling>& samplings, const Way& way = delta,
+                        std::uint32_t host_spp = spp) {
+    const HostImage host = HostTracer(scene, 32).trace(host_spp, 77);
     REQUIRE(host.not_finite == 0);
     for (LightSampling sampling : samplings) {
         scene.render.light_sampling = sampling;
@@ -34,7 +35,7 @@ void check_against_host(const std::string& name, Scene scene, const std::vector<
         check_clean(r);
         const std::string what = name + "_" + std::to_string(static_cast<int>(sampling)) + " by " + way.name();
         check_same(what, colour_of(r.image), colour_of(host));
-        check_same(what + "_alpha", alpha_of(r.image), alpha_of(host, spp));
+        check_same(what + "_alpha", alpha_of(r.image), alpha_of(host, host_spp));
     }
 }
 
@@ -106,17 +107,18 @@ TEST_CASE("Lights.ConstantEqualsHost") {
 
 TEST_CASE("Lights.EnvironmentImageEqualsHost") {
     Scene scene = mixture();
-    scene.lights = {contrast_environment(true, 0.6)};
-    check_against_host("environment", scene, all);
-    check_against_host("environment", scene, mis, decomposition_bvh);
+    // The host finds the bright texel by chance alone: it takes more samples.
+    scene.lights = {contrast_environment(false, 0.6)};
+    check_against_host("environment", scene, all, delta, 4 * spp);
+    check_against_host("environment", scene, mis, decomposition_bvh, 4 * spp);
     scene.lights[0].rotate_y_rad = -2.3;
-    check_against_host("environment_turned", scene, mis);
+    check_against_host("environment_turned", scene, mis, delta, 4 * spp);
 }
 
 TEST_CASE("Lights.EnvironmentImageQuick", "[quick]") {
     Scene scene = mixture();
     scene.lights = {contrast_environment(false, 0.6)};
-    check_against_host("environment_quick", scene, mis);
+    check_against_host("environment_quick", scene, mis, delta, 4 * spp);
 }
 
 TEST_CASE("Lights.PointEqualsHost") {

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+// Renders a device scene that a test may have changed (defines, buffers) with one work-group of machinery less than
+// clume::render: one device, one tile, one batch. What comes back are the film's exact sums.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "runtime/device.h"
+#include "src/device_camera.h"
+#include "src/device_renderer.h"
+#include "src/device_scene.h"
+#include "src/film.h"
+
+namespace clume::test {
+
+struct DeviceImage {
+    std::vector<device::uint> pixels;  ///< film index of each
+    std::vector<FilmSums::Pixel> values;
+    std::uint64_t nonfinite = 0, violations = 0;
+
+    bool same_bits(const DeviceImage& other) const {
+        return pixels == other.pixels && std::equal(values.begin(), values.end(), other.values.begin(), [](const auto& a, const auto& b) {
+                   return std::equal(a.mean, a.mean + 3, b.mean) && std::equal(a.variance, a.variance + 3, b.variance) && a.alpha == b.alpha;
+               });
+    }
+};
+
+inline std::string define_of(const DeviceScene& scene, const std::string& name) {
+    for (const auto& [key, value] : scene.defines)
+        if (key == name) return value;
+    return "";
+}
+
+inline void set_define(DeviceScene& scene, const std::string& name, const std::string& value) {
+    for (auto& [key, old] : scene.defines)
+        if (key == name) {
+            old = value;
+            return;
+        }
+    scene.defines.emplace_back(name, value);
+}
+
+inline DeviceImage render_device(const Scene& scene, const DeviceScene& device, std::uint32_t spp) {
+    DeviceImage image;
+    image.pixels = active_pixels(scene, device, {0, 0, scene.film.width, scene.film.height});
+    const std::vector<Tile> tiles{{0, static_cast<std::uint32_t>(image.pixels.size())}};
+    FilmSums film(image.pixels.size(), define_of(device, "CLUME_CHANNELS") == "1" ? 1 : 3, static_cast<double>(device.params.film_scale));
+    DeviceRenderer renderer(select_devices({}).front(), device, image.pixels, tiles, 0, film);
+    renderer.run({0, 0, spp});
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) image.values.push_back(film.pixel(i));
+    image.nonfinite = film.nonfinite();
+    image.violations = film.violations();
+    return image;
+}
+
+}  // namespace clume::test

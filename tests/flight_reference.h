@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: MIT
+// Mixtures for the flight tests and, in double precision, what free flights along one ray through them must do: the
+// distribution of t, of the primitive collided with, and the escape mass. Closed forms per primitive, Gauss quadrature
+// between the points where a support begins or ends. Normalised coordinates, as the device's.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "src/device_scene.h"
+#include "src/probe.h"
+#include "tests/probe_harness.h"
+#include "tests/reference/analytic_scenes.h"
+
+namespace clume::probing {
+
+/// One primitive along one ray.
+struct LinePrimitive {
+    KernelFamily family;
+    double sigma, w, t_perp, d2, h, e2;
+
+    LinePrimitive(const Ellipsoid& e, const ProbeRay& r) : family(e.family), sigma(e.sigma), e2(e.extent * e.extent) {
+        const auto at = [&](const glm::dvec3& x) { return glm::dvec3(e.w[0] * x.x + e.w[1] * x.y + e.w[2] * x.z, e.w[3] * x.y + e.w[4] * x.z, e.w[5] * x.z); };
+        const glm::dvec3 a = at(glm::dvec3(r.origin[0], r.origin[1], r.origin[2]) - e.center), b = at({r.direction[0], r.direction[1], r.direction[2]});
+        w = glm::length(b);
+        t_perp = -glm::dot(a, b) / (w * w);
+        const glm::dvec3 p = a + t_perp * b;
+        d2 = glm::dot(p, p);
+        h = d2 < e2 ? std::sqrt(e2 - d2) : 0;
+    }
+    bool hit() const { return h > 0 && t_perp + h / w > 0; }
+    double enter() const { return std::max(0.0, t_perp - h / w); }
+    double exit() const { return t_perp + h / w; }
+
+    double density(double t) const {
+        const double u = w * (t - t_perp), r2 = d2 + u * u;
+        if (r2 >= e2) return 0;
+        return sigma * (family == KernelFamily::gaussian ? std::exp(-0.5 * r2) : family == KernelFamily::uniform ? 1 : 1 - r2 / e2);
+    }
+    /// From the ray's begin to t.
+    double depth(double t) const {
+        if (!hit() || t <= enter()) return 0;
+        const double u0 = w * (enter() - t_perp), u1 = w * (std::min(t, exit()) - t_perp);
+        if (family == KernelFamily::uniform) return sigma * (u1 - u0) / w;
+        if (family == KernelFamily::gaussian)
+            return sigma * std::sqrt(std::numbers::pi / 2) * std::exp(-0.5 * d2) / w * (std::erf(u1 / std::numbers::sqrt2) - std::erf(u0 / std::numbers::sqrt2));
+        return sigma / (w * e2) * (u1 - u0) * (h * h - (u0 * u0 + u0 * u1 + u1 * u1) / 3);
+    }
+};
+
+/// Expected collisions: per primitive and bin of t, probabilities; what is left escapes.
+struct FlightLaw {
+    double first = 1e300, last = 0;  ///< where the media begin and end on the ray
+    std::size_t bins;
+    std::vector<std::size_t> ids;              ///< of the primitives hit
+    std::vector<std::vector<double>> by_primitive;  ///< [primitive hit][bin]
+    std::vector<double> by_bin;                ///< bins, then the escape mass
+
+    FlightLaw(const std::vector<Ellipsoid>& ellipsoids, const ProbeRay& ray, std::size_t bin_count) : bins(bin_count), by_bin(bin_count + 1) {
+        std::vector<LinePrimitive> line;
+        for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
+            const LinePrimitive p(ellipsoids[i], ray);
+            if (!p.hit()) continue;
+            line.push_back(p);
+            ids.push_back(i);
+            first = std::min(first, p.enter());
+            last = std::max(last, p.exit());
+        }
+        by_primitive.assign(line.size(), std::vector<double>(bins));
+        if (line.empty()) {
+            by_bin[bins] = 1;
+            return;
+        }
+        std::vector<double> cuts;
+        for (std::size_t b = 0; b <= bins; ++b) cuts.push_back(first + (last - first) * static_cast<double>(b) / static_cast<double>(bins));
+        for (const auto& p : line) cuts.push_back(p.enter()), cuts.push_back(p.exit());
+        std::sort(cuts.begin(), cuts.end());
+        static constexpr double node[] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363};
+        static constexpr double weight[] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763};
+        for (std::size_t c = 0; c + 1 < cuts.size(); ++c) {
+            const double middle = 0.5 * (cuts[c] + cuts[c + 1]), half = 0.5 * (cuts[c + 1] - cuts[c]);
+            if (!(half > 0)) continue;
+            const std::size_t b = bin(middle);
+            for (int k = 0; k < 8; ++k) {
+                const double t = middle + (k % 2 ? half : -half) * node[k / 2];
+                double tau = 0;
+                for (const auto& p : line) tau += p.depth(t);
+                for (std::size_t i = 0; i < line.size(); ++i) by_primitive[i][b] += half * weight[k / 2] * line[i].density(t) * std::exp(-tau);
+            }
+        }
+        double tau = 0;
+        for (const auto& p : line) tau += p.depth(last);
+        by_bin[bins] = std::exp(-tau);
+        for (const auto& row : by_primitive)
+            for (std::size_t b = 0; b < bins; ++b) by_bin[b] += row[b];
+    }
+    std::size_t bin(double t) const { return static_cast<std::size_t>(std::clamp((t - first) / (last - first) * static_cast<double>(bins), 0.0, static_cast<double>(bins - 1))); }
+};
+
+inline Scene empty_scene() {
+    Scene scene;
+    scene.path = "flights";
+    scene.camera.origin = {0, 0, -4};
+    scene.film = {16, 16};
+    return scene;
+}
+
+/// `n` overlapping ellipsoids about the origin, families of `kernels` in turn, each with an extent of its own; a ray
+/// through the middle has an optical depth of about 2.
+inline Scene overlapping_mixture(const std::vector<KernelFamily>& kernels, int n, std::uint64_t seed) {
+    Scene scene = empty_scene();
+    TestRandom random(seed);
+    for (const KernelFamily k : kernels) {
+        EllipsoidMedium m;
+        m.kernel = k;
+        m.extent = k == KernelFamily::gaussian ? 3 : k == KernelFamily::epanechnikov ? 2.2 : 1.6;
+        scene.media.push_back(m);
+    }
+    for (int i = 0; i < n; ++i) {
+        const double s = 0.25;
+        const glm::dvec3 scale(s * random.spread(0.5, 2), s * random.spread(0.5, 2), s * random.spread(0.5, 2));
+        const glm::dvec3 at = n == 1 ? glm::dvec3(0.02, -0.03, 0.01) : 0.35 * glm::dvec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+        scene.media[static_cast<std::size_t>(i) % kernels.size()].primitives.push_back(
+            reference::make_primitive(at, scale, (n < 3 ? 4.0 : 12.0) / n * random.spread(0.5, 2), {random.uniform(), random.uniform(), random.uniform()}));
+    }
+    return scene;
+}
+
+inline DeviceScene device_scene(Scene scene, const std::string& strategy, const std::string& accelerator) {
+    scene.render.strategy = strategy;
+    RenderOptions options;
+    options.accelerator = accelerator;
+    return make_device_scene(scene, options);
+}
+
+inline ProbeRay ray(const glm::dvec3& o, const glm::dvec3& to, double t_end = 1e30) {
+    const glm::dvec3 d = glm::normalize(to);
+    ProbeRay r;
+    for (int k = 0; k < 3; ++k) {
+        r.origin[k] = static_cast<float>(o[k]);
+        r.direction[k] = static_cast<float>(d[k]);
+    }
+    r.t_end = static_cast<float>(t_end);
+    return r;
+}
+
+/// Rays from all about the scene and from inside it, a few axis-parallel.
+inline std::vector<ProbeRay> random_rays(std::size_t count, std::uint64_t seed, double radius = 1) {
+    TestRandom random(seed);
+    std::vector<ProbeRay> rays;
+    const auto point = [&](double size) { return size * glm::dvec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)); };
+    for (std::size_t i = 0; i < count; ++i) {
+        glm::dvec3 o = point(i % 2 ? 0.6 * radius : 2.5 * radius), d = i % 2 ? point(1) : point(0.5 * radius) - o;
+        if (i % 16 == 5) d = glm::dvec3(-0.0, i % 32 < 16 ? 1 : -1, 0.0);
+        if (i % 16 == 6) d.x = -0.0;
+        rays.push_back(ray(o, d, i % 4 == 3 ? random.spread(0.01, 3) : 1e30));
+    }
+    return rays;
+}
+
+}  // namespace clume::probing

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+// Free flights on the device by χ² against double precision: t, escape mass and the primitive collided with, for every
+// family and a mix of them, 1, 2 and 200 overlapping primitives, rays from outside and inside, and every unbiased strategy.
+// All tests of one family are corrected together (Šidák): it fails by chance with probability 1e-4.
+#include <fmt/format.h>
+#include <map>
+#include <numeric>
+
+#include "tests/flight_reference.h"
+#include "tests/reference/statistics.h"
+
+namespace {
+
+using namespace clume;
+using namespace clume::probing;
+using reference::chi_square;
+
+constexpr auto kGaussian = KernelFamily::gaussian;
+constexpr auto kEpanechnikov = KernelFamily::epanechnikov;
+constexpr auto kUniform = KernelFamily::uniform;
+
+struct Strategy {
+    const char *name, *accelerator;
+};
+
+struct FlightP {
+    double t, winner;
+};
+
+/// p-values of `count` flights along one ray.
+FlightP flight_p(Probe& probe, const std::vector<Ellipsoid>& ellipsoids, const ProbeRay& r, std::size_t count, std::uint32_t sample, bool with_winner = true) {
+    const FlightLaw law(ellipsoids, r, 24);
+    std::map<std::size_t, std::size_t> row;
+    for (std::size_t i = 0; i < law.ids.size(); ++i) row[law.ids[i]] = i;
+    std::vector<double> observed(law.bins + 1), expected;
+    std::vector<double> winners(law.ids.size() * law.bins), winners_expected;
+    const auto n = static_cast<double>(count);
+    for (const ProbeHit& hit : probe.flights(std::vector<ProbeRay>(count, r), sample).values) {
+        if (!hit.collided()) {
+            observed[law.bins] += 1;
+            continue;
+        }
+        const double t = static_cast<double>(hit.t);
+        if (t < law.first * (1 - 1e-5) - 1e-5 || t > law.last * (1 + 1e-5)) return {0, 0};
+        observed[law.bin(t)] += 1;
+        if (!with_winner) continue;
+        const auto at = row.find(hit.primitive);
+        if (at == row.end()) return {1, 0};
+        winners[at->second * law.bins + law.bin(t)] += 1;
+    }
+    for (const double p : law.by_bin) expected.push_back(n * p);
+    for (const auto& line : law.by_primitive)
+        for (const double p : line) winners_expected.push_back(n * p);
+    // Both totals are the collisions; the escape mass closes them.
+    winners.push_back(observed[law.bins]);
+    winners_expected.push_back(expected[law.bins]);
+    return {chi_square(observed, expected).p, with_winner ? chi_square(winners, winners_expected).p : 1};
+}
+
+const ProbeRay kRays[] = {ray({0.3, -0.2, -3}, {-0.08, 0.07, 1}), ray({0.05, 0.02, -0.03}, {0.3, -0.9, 0.2}), ray({-0.11, 3, 0.06}, {-0.0, -1, 0.0})};
+
+}  // namespace
+
+TEST_CASE("Flights.FollowTheMixture", "[kernels]") {
+    const std::pair<const char*, std::vector<KernelFamily>> families[] = {
+        {"gaussian", {kGaussian}}, {"epanechnikov", {kEpanechnikov}}, {"uniform", {kUniform}}, {"mixed", {kGaussian, kEpanechnikov, kUniform}}};
+    const Strategy strategies[] = {{"decomposition", "cells"}, {"decomposition", "bvh"}, {"delta", "auto"}};
+    struct Result {
+        std::string what;
+        FlightP p;
+    };
+    std::vector<Result> results;
+    for (const auto& [name, kernels] : families)
+        for (const int n : {1, 2, 200})
+            for (const Strategy& s : strategies) {
+                const DeviceScene scene = device_scene(overlapping_mixture(kernels, n, 40 + static_cast<unsigned>(n)), s.name, s.accelerator);
+                Probe probe(test_device(), scene);
+                std::uint32_t sample = 0;
+                for (const ProbeRay& r : kRays)
+                    results.push_back({fmt::format("{} of {}, {} on {}, ray {}", n, name, s.name, s.accelerator, sample), flight_p(probe, scene.ellipsoids, r, 40000, sample++)});
+            }
+    const double threshold = reference::sidak_threshold(1e-4, 2 * results.size());
+    double least = 1;
+    for (const Result& r : results) {
+        INFO(r.what);
+        least = std::min({least, r.p.t, r.p.winner});
+        CHECK(r.p.t > threshold);
+        CHECK(r.p.winner > threshold);
+    }
+    report(fmt::format("least p {:.2g} of {}, threshold {:.2g}", least, 2 * results.size(), threshold));
+}
+
+TEST_CASE("Flights.OneGaussian", "[kernels][quick]") {
+    for (const Strategy& s : {Strategy{"decomposition", "cells"}, {"delta", "auto"}}) {
+        const DeviceScene scene = device_scene(overlapping_mixture({kGaussian}, 2, 3), s.name, s.accelerator);
+        Probe probe(test_device(), scene);
+        const FlightP p = flight_p(probe, scene.ellipsoids, kRays[0], 40000, 0);
+        CHECK(p.t > 1e-5);
+        CHECK(p.winner > 1e-5);
+    }
+}
+
+TEST_CASE("Flights.MarchIsBiasedByItsStep", "[kernels]") {
+    Scene scene = overlapping_mixture({kGaussian}, 2, 42);
+    std::vector<double> p;
+    for (const double step : {0.3, 0.002}) {
+        scene.render.step = step;
+        const DeviceScene marched = device_scene(scene, "march", "cells");
+        Probe probe(test_device(), marched);
+        p.push_back(flight_p(probe, marched.ellipsoids, kRays[0], 40000, 5, false).t);
+    }
+    INFO("p " << p[0] << " with a coarse step, " << p[1] << " with a fine one");
+    CHECK(p[0] < 1e-9);
+    CHECK(p[1] > 1e-4);
+}
+
+TEST_CASE("Flights.AcceleratorsAndWidthsGiveTheSameBits", "[kernels]") {
+    const auto rays = random_rays(4000, 7);
+    const Scene scene = overlapping_mixture({kGaussian, kEpanechnikov, kUniform}, 400, 11);
+    std::vector<ProbeHit> first;
+    std::size_t collided = 0;
+    for (const char* accelerator : {"cells", "bvh"}) {
+        const DeviceScene packed = device_scene(scene, "decomposition", accelerator);
+        for (const int width : kWidths) {
+            auto hits = Probe(test_device(), packed, width).flights(rays, 3).values;
+            for (ProbeHit& h : hits) h.work = 0;
+            if (first.empty()) {
+                first = hits;
+                for (const ProbeHit& h : hits) collided += h.collided();
+            }
+            INFO(accelerator << " on width " << width);
+            const std::size_t at = first_difference(first, hits);
+            CAPTURE(at);
+            CHECK(at == rays.size());
+        }
+    }
+    CHECK(collided > 800);
+    CHECK(collided < 3200);
+    const DeviceScene packed = device_scene(scene, "delta", "auto");
+    const auto wide = Probe(test_device(), packed, 16).flights(rays, 3).values;
+    for (const int width : {8, 4, 1}) CHECK(first_difference(wide, Probe(test_device(), packed, width).flights(rays, 3).values) == rays.size());
+}
+
+TEST_CASE("Flights.IdenticalPrimitivesShareTheirDensity", "[kernels]") {
+    // m primitives of 1/m of the density are one primitive, and each of them wins as often.
+    constexpr int m = 37;
+    for (const KernelFamily k : {kGaussian, kEpanechnikov, kUniform}) {
+        Scene one = overlapping_mixture({k}, 1, 5), many = one;
+        auto& list = many.media[0].primitives;
+        list[0].sigma_t /= m;
+        list.resize(m, list[0]);
+        for (const Strategy& s : {Strategy{"decomposition", "cells"}, {"delta", "auto"}}) {
+            const DeviceScene scene = device_scene(many, s.name, s.accelerator), single = device_scene(one, s.name, s.accelerator);
+            Probe probe(test_device(), scene);
+            const auto hits = probe.flights(std::vector<ProbeRay>(40000, kRays[1])).values;
+            std::vector<double> wins(m);
+            for (const auto& h : hits)
+                if (h.collided()) wins[h.primitive] += 1;
+            const double total = std::accumulate(wins.begin(), wins.end(), 0.0);
+            CHECK(chi_square(wins, std::vector<double>(m, total / m)).p > 1e-6);
+            CHECK(flight_p(probe, single.ellipsoids, kRays[1], 40000, 1, false).t > 1e-6);
+        }
+    }
+}
+
+TEST_CASE("Flights.OrderOfPrimitivesIsNoise", "[kernels]") {
+    Scene scene = overlapping_mixture({kGaussian, kUniform}, 60, 6);
+    for (const Strategy& s : {Strategy{"decomposition", "cells"}, {"delta", "auto"}}) {
+        std::vector<double> histogram[2];
+        for (int turn = 0; turn < 2; ++turn) {
+            if (turn == 1)
+                for (auto& m : scene.media) std::reverse(m.primitives.begin(), m.primitives.end());
+            const DeviceScene packed = device_scene(scene, s.name, s.accelerator);
+            const FlightLaw law(packed.ellipsoids, kRays[0], 24);
+            histogram[turn].assign(law.bins + 1, 0);
+            for (const auto& h : Probe(test_device(), packed).flights(std::vector<ProbeRay>(40000, kRays[0]), static_cast<std::uint32_t>(turn)).values)
+                histogram[turn][h.collided() ? law.bin(static_cast<double>(h.t)) : law.bins] += 1;
+        }
+        CHECK(reference::chi_square_two(histogram[0], histogram[1]).p > 1e-5);
+    }
+}
