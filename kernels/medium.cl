@@ -105,12 +105,12 @@ static void group_decompose(uint g, float3 o, float3 d, float t_begin, float low
 }
 
 /// Optical depth between t_begin and t_end of the primitives of group g whose chord begins in [lower, upper): fixed point,
-/// 40 fraction bits, clamped to 2^8.
+/// 40 fraction bits, clamped to 2^8. Each primitive is rounded to 37 fraction bits on its own, in two exact halves, so that
+/// the sum does not depend on which group holds it.
 static ulong group_depth(uint g, float3 o, float3 d, float t_begin, float t_end, float lower, float upper, SCENE_ARGS) {
     const uint family = group_family(g);
     const float e2 = group_extent_squared(g);
-    vfloat sum[CLUME_PARTS];
-    int found = 0;
+    vint high = (vint)0, low = (vint)0;
     for (int k = 0; k < CLUME_PARTS; ++k) {
         __global const float* part = groups + (size_t)g * CLUME_GROUP_FLOATS + k * CLUME_WIDTH;
         Chord c;
@@ -118,14 +118,23 @@ static ulong group_depth(uint g, float3 o, float3 d, float t_begin, float t_end,
         const vfloat start = vselect(c.t_in, (vfloat)t_begin, c.t_in < (vfloat)t_begin);
         const vfloat stop = vselect(c.t_out, (vfloat)t_end, c.t_out > (vfloat)t_end);
         mask &= (start < stop) & (start >= (vfloat)lower) & (start < (vfloat)upper);
-        sum[k] = (vfloat)0.0f;
         if (!vany(mask)) continue;
-        found = 1;
-        const vfloat depth = depth_part(&c, vload_row(part + 16 * CLUME_ROW_SIGMA), start, vselect(start, stop, mask), family, e2);
-        sum[k] = vselect((vfloat)0.0f, depth, mask);
+        vfloat depth = depth_part(&c, vload_row(part + 16 * CLUME_ROW_SIGMA), start, vselect(start, stop, mask), family, e2);
+        depth = vselect((vfloat)0.0f, depth, mask);
+        depth = vselect(depth, (vfloat)128.0f, depth > (vfloat)128.0f);
+        const vfloat magic = (vfloat)12582912.0f;  // adding it rounds to an integer, found in the low bits
+        const vfloat shifted = fma(depth, (vfloat)0x1p14f, magic);
+        const vfloat rest = fma(shifted - magic, (vfloat)-0x1p-14f, depth);
+        high += as_vint(shifted) - (vint)0x4b400000;
+        low += as_vint(fma(rest, (vfloat)0x1p37f, magic)) - (vint)0x4b400000;
     }
-    if (!found) return 0;
-    return convert_ulong_rtz(min_s(reduce_lanes(sum), 256.0f) * 0x1p40f);
+    int high_sum = 0, low_sum = 0;
+    for (int i = 0; i < CLUME_WIDTH; ++i) {
+        high_sum += ((const int*)&high)[i];
+        low_sum += ((const int*)&low)[i];
+    }
+    const ulong sum = (ulong)(((long)high_sum << 26) + ((long)low_sum << 3));
+    return min(sum, (ulong)256 << 40);
 }
 
 /// e^(−depth) of a fixed-point sum; 0 from 2^7 on.

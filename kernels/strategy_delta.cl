@@ -18,14 +18,14 @@ static float primitive_kernel(__global const Primitive* q, float px, float py, f
     const uint family = q->family;
     const float e2 = q->extent_squared;
 #endif
-    if (!(r2 < e2)) return 0.0f;
+    float k = 1.0f;
 #if CLUME_FAMILIES & FAMILY_GAUSSIAN
-    if (family == FAMILY_GAUSSIAN) return exp_s(-0.5f * r2);
+    if (family == FAMILY_GAUSSIAN) k = exp_s(-0.5f * r2);
 #endif
 #if CLUME_FAMILIES & FAMILY_EPANECHNIKOV
-    if (family == FAMILY_EPANECHNIKOV) return fma(r2, -rcp_s(e2), 1.0f);
+    if (family == FAMILY_EPANECHNIKOV) k = fma(r2, -rcp_s(e2), 1.0f);
 #endif
-    return 1.0f;
+    return r2 < e2 ? k : 0.0f;
 }
 
 static int flight_delta(float3 o, float3 d, float t_end, Flight* f, const Draws* r, SCENE_ARGS) {
@@ -50,7 +50,9 @@ static int flight_delta(float3 o, float3 d, float t_end, Flight* f, const Draws*
             const CellLeaf leaf = leaves[w.link - CELL_EMPTY_MAX];
             __global const Reference* list = references + leaf.first_reference;
             const uint slot = uniform_index(slot_bits, leaf.reference_count);
-            const uint chosen = threshold_bits < list[slot].threshold ? slot : list[slot].other;
+            // Arithmetic, not a branch: which of the two can't be predicted.
+            const uint other = list[slot].other;
+            const uint chosen = other + (slot - other) * (uint)(threshold_bits < list[slot].threshold);
             const uint primitive = list[chosen].primitive;
             const float probability = primitive_kernel(primitives + primitive, fma(t, d.x, o.x), fma(t, d.y, o.y), fma(t, d.z, o.z)) * list[chosen].scale;
             f->violations += probability > 1.0f ? 1u : 0u;

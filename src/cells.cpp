@@ -10,7 +10,7 @@
 namespace clume {
 namespace {
 
-const std::uint32_t kMaxLevels = getenv("LV") ? atoi(getenv("LV")) : 8;
+constexpr std::uint32_t kMaxLevels = 8;
 constexpr std::size_t kMaxRoots = std::size_t{1} << 22;
 
 struct Cost {
@@ -92,7 +92,7 @@ struct Refiner {
         }
         const double own = cost(size, n, list.majorant);
         const bool crowded = n > 64 * CLUME_GROUP_SIZE && references < 4 * n;
-        if (!crowded && (child_cost > 0.92 * own || static_cast<double>(references) > allowance * static_cast<double>(n)))
+        if (!crowded && (child_cost > 0.55 * own || static_cast<double>(references) > allowance * static_cast<double>(n)))
             return leaf(out, std::move(list));
         const std::size_t block = out.blocks.size() / 8;
         out.blocks.resize(out.blocks.size() + 8);
@@ -145,7 +145,7 @@ double choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree& tr
         if (total < best_cost) best_cost = total, best_size = size;
         if (total > 3 * best_cost) break;
     }
-    return best_size * (getenv("RS") ? atof(getenv("RS")) : 1);
+    return best_size;
 }
 
 /// For each empty root, the Chebyshev distance to the nearest root that is not empty (or lies outside), capped.

@@ -16,7 +16,7 @@ namespace clume {
 /// What a kernel pays, in nanoseconds of one core (fitted once to a 16-wide CPU; only ratios matter). The builder minimises
 /// the cost of travelling through the media.
 struct CellCosts {
-    double step = 18;        ///< entering a cell
+    double step = 28;        ///< entering a cell
     double tentative = 25;   ///< one tentative collision
     double chord = 45;       ///< one group's chords and free flights or depths
     double null_share = 1;   ///< rays that sample by null collisions (0..1)
