@@ -15,7 +15,7 @@ std::vector<BenchScene> bench_scenes() {
     scenes.push_back({"close", read_scene(folder / "smoke_close.json"), 32});
     scenes.push_back({"dense", read_scene(folder / "smoke_dense.json"), 8});
     scenes.push_back({"point", read_scene(folder / "smoke_point.json"), 32});
-    scenes.push_back({"ball", reference::ball_scene(), 1});
+    scenes.push_back({"ball", reference::ball_scene(), 3});
     return scenes;
 }
 
