@@ -59,7 +59,8 @@ static void bvh_decompose(float3 o, float3 d, float t_begin, uint2 key, float* b
     }
 }
 
-static ulong bvh_depth(float3 o, float3 d, float t_begin, float t_end, SCENE_ARGS) {
+/// Optical depth between t_begin and t_end, or any partial sum that has reached `limit`.
+static ulong bvh_depth(float3 o, float3 d, float t_begin, float t_end, ulong limit, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
     const float3 inverse = bvh_inverse(d);
     ulong depth = 0;
@@ -76,7 +77,7 @@ static ulong bvh_depth(float3 o, float3 d, float t_begin, float t_end, SCENE_ARG
             else
                 stack[height++] = child;
         }
-        if (height == 0 || depth >= ((ulong)128 << 40)) return depth;
+        if (height == 0 || depth >= limit) return depth;
         node = stack[--height];
     }
 }

@@ -64,13 +64,14 @@ static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws*
 #else
     const uint4 more = (uint4)0u;
 #endif
-    if (!light_sample(x, draw_bits(r, DRAW_LIGHT), more, &s, params, lights, texels, alias)) return (spectrum)0.0f;
+    const uint4 bits = draw_bits(r, DRAW_LIGHT);
+    if (!light_sample(x, bits, more, &s, params, lights, texels, alias)) return (spectrum)0.0f;
     uint blocker;
     surfaces_nearest(x, s.direction, s.distance, s.light, &blocker, params, lights);
     if (blocker != NO_LIGHT) return (spectrum)0.0f;
     const float value = phase_value(phase, g, dot_s(d, s.direction));
     const float weight = (lights[s.light].kind & CLUME_HITS) ? divide_s(s.pdf, s.pdf + value) : 1.0f;
-    return s.value * (value * weight * transmittance_analytic(x, s.direction, s.distance, SCENE));
+    return s.value * (value * weight * transmittance_analytic(x, s.direction, s.distance, transmittance_limit(exponential_s(bits.w)), SCENE));
 #else
     return (spectrum)0.0f;
 #endif

@@ -68,7 +68,7 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
         }
         r.w = as_float(f.work);
     }
-    if (what & 2u) r.z = transmittance_analytic(o, d, t_end, SCENE);
+    if (what & 2u) r.z = transmittance_analytic(o, d, t_end, transmittance_limit(CLUME_INFINITY), SCENE);
     out[i] = r;
 }
 

@@ -1,26 +1,39 @@
 // SPDX-License-Identifier: MIT
 // `analytic`: exp(−Σ τ_i), exact; needs no order. A primitive listed in several cells counts in the one where its chord
-// begins, so the sum does not depend on the cells.
+// begins, so the sum does not depend on the cells. Past an optical depth of CLUME_EXACT_DEPTH it goes on by roulette: one
+// exponential number e, and the answer is exp(−CLUME_EXACT_DEPTH) if the whole depth stays below CLUME_EXACT_DEPTH + e,
+// else 0. That has the right mean, ends as soon as a partial sum exceeds the limit, and does not depend on the order.
 #include "bvh.cl"
 
-/// Transmittance from o along d up to t_end.
-static float transmittance_analytic(float3 o, float3 d, float t_end, SCENE_ARGS) {
+#ifndef CLUME_EXACT_DEPTH  // in units of 1
+#define CLUME_EXACT_DEPTH 2
+#endif
+
+/// Fixed-point optical depth at which a sum may end, for an exponential number e (CLUME_INFINITY: no roulette).
+static ulong transmittance_limit(float e) {
+    return ((ulong)CLUME_EXACT_DEPTH << 40) + convert_ulong_rtz(min_s(e, 128.0f - CLUME_EXACT_DEPTH) * 0x1p40f);
+}
+
+/// Estimate of the transmittance from o along d up to t_end; `limit` from transmittance_limit.
+static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit, SCENE_ARGS) {
+    ulong depth = 0;
 #if CLUME_ACCEL == ACCEL_CELLS
     CellWalk w;
     if (!cells_enter(&w, o, d, 0.0f, t_end, params, cells)) return 1.0f;
     float lower = -CLUME_INFINITY;
-    ulong depth = 0;
     do {
         if (w.link >= CELL_EMPTY_MAX) {
             const CellLeaf leaf = leaves[w.link - CELL_EMPTY_MAX];
             for (uint g = leaf.first_group; g < leaf.first_group + leaf.group_count; ++g)
                 depth += group_depth(g, o, d, 0.0f, t_end, lower, w.t_exit, SCENE);
-            if (depth >= ((ulong)128 << 40)) return 0.0f;
+            if (depth >= limit) return 0.0f;
         }
         lower = w.t_exit;
     } while (cells_next(&w, params, cells));
-    return depth_transmittance(depth);
 #else
-    return depth_transmittance(bvh_depth(o, d, 0.0f, t_end, SCENE));
+    depth = bvh_depth(o, d, 0.0f, t_end, limit, SCENE);
+    if (depth >= limit) return 0.0f;
 #endif
+    const ulong exact = (ulong)CLUME_EXACT_DEPTH << 40;
+    return depth_transmittance(limit < ((ulong)128 << 40) && depth > exact ? exact : depth);
 }
