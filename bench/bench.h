@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// `clume bench`: kernels and scenes measured with Google Benchmark, beside the plain host tracer.
+// `clume bench`: the whole renderer beside the plain host tracer, its kernels one by one, what specialisation saves, and how
+// cost grows with the number of primitives. docs/performance.md says what each section measures.
 #pragma once
 
 namespace clume {
 
-/// argv[0] is the program; the rest are Google Benchmark's flags and ours (--help lists them). Returns an exit code.
+/// argv[0] is the subcommand's name; the rest are its flags (--help lists them). Returns an exit code. Throws UsageError for
+/// a wrong flag, DeviceError, SceneError, RenderError (the JSON file can't be written).
 int run_bench(int argc, char** argv);
 
 }  // namespace clume

@@ -1,25 +1,24 @@
 // SPDX-License-Identifier: MIT
-#include "bench/compare_host.h"
+// The renderer beside the plain host tracer (tests/reference/host_tracer.h), on as many threads as the device has units and
+// the better of its two grids, interleaved round by round in one run, so that both meet the same machine. Speeds are medians
+// over the rounds; variances, which rare bright paths dominate, are means over all rounds. An inverse efficiency is
+// variance of a sample × seconds per path; the ratio printed is the host's over ours.
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdio>
-#include <fmt/format.h>
-#include <memory>
+#include <ctime>
+#include <thread>
 
+#include "bench/rays.h"
 #include "bench/scenes.h"
+#include "bench/sections.h"
 #include "src/renderer.h"
 #include "tests/reference/host_tracer.h"
 
-namespace clume {
+namespace clume::bench {
 namespace {
-
-double median(std::vector<double> v) {
-    std::sort(v.begin(), v.end());
-    const std::size_t n = v.size();
-    return n % 2 ? v[n / 2] : 0.5 * (v[n / 2 - 1] + v[n / 2]);
-}
 
 /// Mean over pixels and channels of the variance of one sample.
 template <class T>
@@ -29,44 +28,137 @@ double sample_variance(const std::vector<T>& variance_of_mean, double spp) {
     return sum / static_cast<double>(variance_of_mean.size()) * spp;
 }
 
-struct Measured {
-    std::vector<double> mpaths_s, variance, cost;  ///< cost: variance of a sample × seconds per path of the film [1e-6]
-    void add(double paths, double seconds, double v) {
-        mpaths_s.push_back(paths / seconds / 1e6);
+/// Of one side, per round: wall and processor seconds per item (path or flight), variance of a sample.
+struct Side {
+    std::vector<double> wall_s, cpu_s, variance;
+    void add(double items, double wall, double cpu, double v = 0) {
+        wall_s.push_back(wall / items);
+        cpu_s.push_back(cpu / items);
         variance.push_back(v);
-        cost.push_back(v * seconds / paths * 1e6);
     }
+    double mega_per_s() const { return 1e-6 / median(wall_s); }
+    double cpu_us() const { return 1e6 * median(cpu_s); }
 };
+
+/// Median over the rounds of a ratio of neighbours in time.
+double ratio(const std::vector<double>& theirs, const std::vector<double>& ours) {
+    std::vector<double> r;
+    for (std::size_t i = 0; i < theirs.size(); ++i) r.push_back(theirs[i] / ours[i]);
+    return median(r);
+}
+
+double cpu_now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+double round_seconds(const Session& session) { return session.options().quick ? 0.1 : 0.5; }
+
+/// Samples per pixel that take about `seconds`, at least `least`.
+std::uint32_t samples_for(double seconds, double seconds_per_sample, std::uint32_t least) {
+    return static_cast<std::uint32_t>(std::clamp(std::ceil(seconds / seconds_per_sample), static_cast<double>(least), 65536.0));
+}
+
+void compare_paths(Session& session, const std::string& name, Scene scene, int threads) {
+    const Options& options = session.options();
+    if (!options.strategy.empty()) scene.render.strategy = options.strategy;
+    const int cells = reference::best_cell_resolution(scene, threads);
+    const reference::HostTracer host(scene, cells);
+    const RenderOptions render_options = session.render_options();
+    const std::atomic<bool> stop{false};
+    const double target = round_seconds(session), pixels = static_cast<double>(scene.film.width) * scene.film.height;
+    std::uint32_t host_spp = 2, spp = 8;
+    Side theirs, ours;
+    std::string strategy;
+    // The first two rounds warm up and find out how many samples fill a round.
+    for (int round = -2; round < session.rounds(7); ++round) {
+        const auto seed = static_cast<std::uint64_t>(round + 2);
+        const double before = cpu_now();
+        const auto image = host.trace(host_spp, seed, threads);
+        const double host_cpu = cpu_now() - before;
+        scene.render.seed = seed + 1000;
+        scene.render.spp = static_cast<int>(spp);
+        const RenderResult r = render(scene, render_options, {}, stop);
+        if (round < 0) {
+            host_spp = samples_for(target, image.seconds / host_spp, 2);
+            spp = samples_for(target, r.stats.render_s / spp, 4);
+            strategy = r.stats.strategy;
+            continue;
+        }
+        theirs.add(pixels * host_spp, image.seconds, host_cpu, sample_variance(image.variance, host_spp));
+        ours.add(static_cast<double>(r.stats.paths), r.stats.render_s, r.stats.cpu_s, sample_variance(r.image.variance, spp));
+    }
+    const double paths = ratio(theirs.wall_s, ours.wall_s), variance = mean(theirs.variance) / mean(ours.variance), cpu = ratio(theirs.cpu_s, ours.cpu_s);
+    session.record(name,
+                   fmt::format("{:14} {:9.3f} {:9.3f} {:7.2f} {:11.4g} {:11.4g} {:10.2f} {:9.3f} {:9.3f} {:7.2f}", name, theirs.mega_per_s(), ours.mega_per_s(), paths,
+                               mean(theirs.variance), mean(ours.variance), paths * variance, theirs.cpu_us(), ours.cpu_us(), cpu * variance),
+                   {{"strategy", strategy}, {"host_cells", static_cast<double>(cells)}, {"host_spp", static_cast<double>(host_spp)}, {"spp", static_cast<double>(spp)},
+                    {"host_mpaths_s", theirs.mega_per_s()}, {"mpaths_s", ours.mega_per_s()}, {"ratio_paths", paths}, {"host_variance", mean(theirs.variance)},
+                    {"variance", mean(ours.variance)}, {"ratio_inverse_efficiency", paths * variance}, {"host_cpu_us_per_path", theirs.cpu_us()},
+                    {"cpu_us_per_path", ours.cpu_us()}, {"ratio_inverse_efficiency_cpu", cpu * variance}});
+}
+
+/// Free flights alone; the device's seconds are those of the kernel, reading the rays and writing the hits included.
+void compare_flights(Session& session, const std::string& name, const Scene& base, bool inside, int threads) {
+    Scene scene = base;
+    if (!session.options().strategy.empty()) scene.render.strategy = session.options().strategy;
+    const DeviceScene device = make_device_scene(scene, session.render_options());
+    Probe probe(session.device(), device, session.options().width);
+    const auto rays = inside ? inside_rays(device, std::size_t{1} << 16, 1) : camera_rays(probe, scene.film.width, scene.film.height, 1, 0);
+    int cells = 0;
+    double best = -1;
+    for (int c : {48, 96})
+        if (const double rate = reference::HostTracer(scene, c).free_flights(100000, inside, 0, threads).flights_per_s; rate > best) best = rate, cells = c;
+    const reference::HostTracer host(scene, cells);
+    const double target = round_seconds(session);
+    std::uint64_t host_count = 100000;
+    std::uint32_t launches = 1, sample = 0;
+    Side theirs, ours;
+    double host_collided = 0, collided = 0, host_flights = 0, flights = 0;
+    for (int round = -2; round < session.rounds(7); ++round) {
+        const double before = cpu_now();
+        const auto rate = host.free_flights(host_count, inside, static_cast<std::uint64_t>(round + 2), threads);
+        const double host_cpu = cpu_now() - before, host_s = static_cast<double>(rate.flights) / rate.flights_per_s;
+        double device_s = 0, cpu_s = 0;
+        for (std::uint32_t i = 0; i < launches; ++i, ++sample) {
+            const double start = cpu_now();
+            const auto run = probe.flights(rays, sample);
+            cpu_s += cpu_now() - start;
+            device_s += run.device_s;
+            collided += static_cast<double>(std::count_if(run.values.begin(), run.values.end(), [](const ProbeHit& h) { return h.collided(); }));
+        }
+        const double count = static_cast<double>(rays.size()) * launches;
+        flights += count;
+        host_collided += static_cast<double>(rate.collided);
+        host_flights += static_cast<double>(rate.flights);
+        if (round < 0) {
+            host_count = static_cast<std::uint64_t>(std::max(1e4, static_cast<double>(host_count) * target / host_s));
+            launches = samples_for(target, device_s / launches, 1);
+            continue;
+        }
+        theirs.add(static_cast<double>(rate.flights), host_s, host_cpu);
+        ours.add(count, device_s, cpu_s);
+    }
+    const double r = ratio(theirs.wall_s, ours.wall_s);
+    session.record(name,
+                   fmt::format("{:14} {:9.3f} {:9.3f} {:7.2f} {:10.1f}% {:10.1f}% {:10} {:9.3f} {:9.3f}", name, theirs.mega_per_s(), ours.mega_per_s(), r,
+                               100 * host_collided / host_flights, 100 * collided / flights, "", theirs.cpu_us(), ours.cpu_us()),
+                   {{"strategy", device.strategy}, {"host_cells", static_cast<double>(cells)}, {"host_mflights_s", theirs.mega_per_s()}, {"mflights_s", ours.mega_per_s()},
+                    {"ratio_flights", r}, {"host_collided", host_collided / host_flights}, {"collided", collided / flights}});
+}
 
 }  // namespace
 
-void compare_with_host(const HostComparison& options) {
-    fmt::print("{:8} {:>5} {:>12} {:>12} {:>7} {:>12} {:>12} {:>12}\n", "scene", "cells", "host Mp/s", "clume Mp/s", "ratio", "host var", "clume var", "efficiency");
-    for (auto& [name, scene, spp] : bench_scenes()) {
-        if (name.find(options.filter) == std::string::npos) continue;
-        if (!options.strategy.empty()) scene.render.strategy = options.strategy;
-        const int cells = reference::best_cell_resolution(scene);
-        const reference::HostTracer host(scene, cells);
-        RenderOptions o;
-        if (!options.device.empty()) o.devices = {options.device};
-        o.vector_width = options.vector_width;
-        o.accelerator = options.accelerator;
-        const std::atomic<bool> stop{false};
-        Measured theirs, ours;
-        // Variance of rare bright paths settles slowly: it is taken over all rounds.
-        for (int round = 0; round <= options.rounds; ++round) {
-            const auto image = host.trace(spp, static_cast<std::uint64_t>(round));
-            scene.render.seed = static_cast<std::uint64_t>(round) + 1000;
-            scene.render.spp = 4 * spp;
-            const RenderResult r = render(scene, o, {}, stop);
-            if (round == 0) continue;  // warm-up
-            theirs.add(static_cast<double>(image.paths), image.seconds, sample_variance(image.variance, spp));
-            ours.add(static_cast<double>(r.stats.paths), r.stats.render_s, sample_variance(r.image.variance, 4 * spp));
-        }
-        fmt::print("{:8} {:5} {:12.3f} {:12.3f} {:7.2f} {:12.5g} {:12.5g} {:12.2f}\n", name, cells, median(theirs.mpaths_s), median(ours.mpaths_s),
-                   median(ours.mpaths_s) / median(theirs.mpaths_s), median(theirs.variance), median(ours.variance), median(theirs.cost) / median(ours.cost));
-        std::fflush(stdout);
-    }
+void bench_scenes_section(Session& session) {
+    session.section("scenes",
+                    "An item is a path (ball_*: a free flight, from inside the ball or from the camera over the whole film).\n"
+                    "host: plain double-precision delta tracker, cell lists. ratio: paths/s. efficiency: ratio of inverse efficiencies\n"
+                    "(variance of a sample x wall seconds per path); the last three columns are processor microseconds per item and\n"
+                    "the same ratio by processor time. For flights, the share that collides stands where variances stand.\n" +
+                        fmt::format("{:14} {:>9} {:>9} {:>7} {:>11} {:>11} {:>10} {:>9} {:>9} {:>7}", "", "host M/s", "clume M/s", "ratio", "host var", "clume var", "efficiency",
+                                    "host cpu", "clume cpu", "eff cpu"));
+    const auto threads = [&] { return static_cast<int>(session.device().type == "cpu" ? session.device().compute_units : std::thread::hardware_concurrency()); };
+    for (const std::string& name : scene_names())
+        if (session.wants(name)) compare_paths(session, name, bench_scene(name), threads());
+    for (const bool inside : {true, false})
+        if (const std::string name = inside ? "ball_inside" : "ball_camera"; session.wants(name)) compare_flights(session, name, bench_scene("ball"), inside, threads());
 }
 
-}  // namespace clume
+}  // namespace clume::bench

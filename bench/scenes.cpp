@@ -6,17 +6,16 @@
 #include "src/scene_reader.h"
 #include "tests/reference/analytic_scenes.h"
 
-namespace clume {
+namespace clume::bench {
 
-std::vector<BenchScene> bench_scenes() {
-    const std::filesystem::path folder = CLUME_SCENES_DIR;
-    std::vector<BenchScene> scenes;
-    scenes.push_back({"wide", read_scene(folder / "smoke_wide.json"), 64});
-    scenes.push_back({"close", read_scene(folder / "smoke_close.json"), 32});
-    scenes.push_back({"dense", read_scene(folder / "smoke_dense.json"), 8});
-    scenes.push_back({"point", read_scene(folder / "smoke_point.json"), 32});
-    scenes.push_back({"ball", reference::ball_scene(), 3});
-    return scenes;
+const std::vector<std::string>& scene_names() {
+    static const std::vector<std::string> names{"wide", "close", "dense", "point", "ball"};
+    return names;
 }
 
-}  // namespace clume
+Scene bench_scene(const std::string& name) {
+    if (name == "ball") return reference::ball_scene();
+    return read_scene(std::filesystem::path(CLUME_SCENES_DIR) / ("smoke_" + name + ".json"));
+}
+
+}  // namespace clume::bench

@@ -7,15 +7,12 @@
 
 #include "src/scene.h"
 
-namespace clume {
+namespace clume::bench {
 
-struct BenchScene {
-    std::string name;
-    Scene scene;
-    std::uint32_t spp;  ///< samples for about a second of one run
-};
+/// Names of the benchmark scenes: wide, close, dense, point (smoke.ply) and ball.
+const std::vector<std::string>& scene_names();
 
-/// wide, close, dense, point (smoke.ply) and ball. Throws SceneError if the bundled volume is not found.
-std::vector<BenchScene> bench_scenes();
+/// Throws SceneError if the bundled volume is not found.
+Scene bench_scene(const std::string& name);
 
-}  // namespace clume
+}  // namespace clume::bench

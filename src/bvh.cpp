@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <future>
-#include <numeric>
+
+#include "src/parallel.h"
 
 namespace clume {
 namespace {
@@ -24,23 +26,44 @@ double half_area(const Box& b) {
     return d.x * d.y + d.y * d.z + d.z * d.x;
 }
 
-/// A subtree over order[first, first + count), its nodes appended to `nodes`; big halves are built by another thread.
-struct Builder {
-    std::span<const Ellipsoid> ellipsoids;
-    std::vector<std::uint32_t>& order;
+/// What the builder moves about: a primitive's box, rounded outwards, and its index. Kept small and in order: the build is
+/// bound by memory.
+struct Item {
+    glm::vec3 lo, hi;
+    std::uint32_t index;
 
-    Box box_of(std::uint32_t i) const { return {ellipsoids[i].center - ellipsoids[i].half, ellipsoids[i].center + ellipsoids[i].half}; }
+    float middle(int axis) const { return 0.5f * (lo[axis] + hi[axis]); }
+};
+
+struct ItemBox {
+    glm::vec3 lo{1e30f}, hi{-1e30f};
+
+    void grow(const glm::vec3& a, const glm::vec3& b) {
+        lo = glm::min(lo, a);
+        hi = glm::max(hi, b);
+    }
+    double half_area() const {
+        const glm::dvec3 d = glm::max(glm::dvec3(hi) - glm::dvec3(lo), glm::dvec3(0));
+        return d.x * d.y + d.y * d.z + d.z * d.x;
+    }
+};
+
+/// A subtree over items[first, first + count), its nodes appended to `nodes`; big halves are built by another thread.
+struct Builder {
+    std::vector<Item>& items;
 
     std::vector<BvhTree::Node> build(std::uint32_t first, std::uint32_t count, int threads_log2) {
         std::vector<BvhTree::Node> nodes(1);
-        Box box = empty_box(), centers = empty_box();
+        ItemBox box, centers;
         for (std::uint32_t i = first; i < first + count; ++i) {
-            grow(box, box_of(order[i]));
-            grow(centers, {ellipsoids[order[i]].center, ellipsoids[order[i]].center});
+            const Item& item = items[i];
+            box.grow(item.lo, item.hi);
+            const glm::vec3 c = 0.5f * (item.lo + item.hi);
+            centers.grow(c, c);
         }
-        nodes[0].box = box;
+        nodes[0].box = {glm::dvec3(box.lo), glm::dvec3(box.hi)};
         if (count <= kLeaf) {
-            std::sort(order.begin() + first, order.begin() + first + count);
+            std::sort(items.begin() + first, items.begin() + first + count, [](const Item& a, const Item& b) { return a.index < b.index; });
             nodes[0].first = first;
             nodes[0].count = count;
             return nodes;
@@ -63,6 +86,7 @@ struct Builder {
             }
             return base;
         };
+        nodes.reserve(1 + a.size() + b.size());
         nodes[0].left = append(a);
         nodes[0].right = append(b);
         return nodes;
@@ -70,43 +94,41 @@ struct Builder {
 
     /// Reorders the range and returns how many go left: binned surface area over the widest axis of the centres, or the
     /// median where all centres (nearly) coincide.
-    std::uint32_t split(std::uint32_t first, std::uint32_t count, const Box& centers) {
-        const glm::dvec3 extent = centers.hi - centers.lo;
+    std::uint32_t split(std::uint32_t first, std::uint32_t count, const ItemBox& centers) {
+        const glm::vec3 extent = centers.hi - centers.lo;
         const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
-        const auto begin = order.begin() + first;
-        if (extent[axis] > 0) {
-            std::array<Box, kBins> boxes;
+        const auto begin = items.begin() + first;
+        const float origin = centers.lo[axis], scale = kBins / extent[axis];
+        if (extent[axis] > 0 && scale < 1e30f) {
+            std::array<ItemBox, kBins> boxes;
             std::array<std::uint32_t, kBins> counts{};
-            boxes.fill(empty_box());
-            const auto bin = [&](std::uint32_t i) {
-                return std::min(kBins - 1, static_cast<int>((ellipsoids[i].center[axis] - centers.lo[axis]) / extent[axis] * kBins));
-            };
+            const auto bin = [&](const Item& item) { return std::min(kBins - 1, static_cast<int>((item.middle(axis) - origin) * scale)); };
             for (std::uint32_t k = 0; k < count; ++k) {
                 const int b = bin(begin[k]);
-                grow(boxes[b], box_of(begin[k]));
-                ++counts[b];
+                boxes[static_cast<std::size_t>(b)].grow(begin[k].lo, begin[k].hi);
+                ++counts[static_cast<std::size_t>(b)];
             }
             std::array<double, kBins> right_cost{};
-            Box box = empty_box();
+            ItemBox box;
             std::uint32_t n = 0;
-            for (int b = kBins - 1; b > 0; --b) {
-                grow(box, boxes[b]);
+            for (std::size_t b = kBins - 1; b > 0; --b) {
+                box.grow(boxes[b].lo, boxes[b].hi);
                 n += counts[b];
-                right_cost[b] = half_area(box) * ((n + kLeaf - 1) / kLeaf);
+                right_cost[b] = box.half_area() * ((n + kLeaf - 1) / kLeaf);
             }
-            box = empty_box();
+            box = {};
             n = 0;
             int best = -1;
             double best_cost = 0;
-            for (int b = 0; b + 1 < kBins; ++b) {
-                grow(box, boxes[b]);
+            for (std::size_t b = 0; b + 1 < kBins; ++b) {
+                box.grow(boxes[b].lo, boxes[b].hi);
                 n += counts[b];
                 if (n == 0 || n == count) continue;
-                const double cost = half_area(box) * ((n + kLeaf - 1) / kLeaf) + right_cost[b + 1];
-                if (best < 0 || cost < best_cost) best = b, best_cost = cost;
+                const double cost = box.half_area() * ((n + kLeaf - 1) / kLeaf) + right_cost[b + 1];
+                if (best < 0 || cost < best_cost) best = static_cast<int>(b), best_cost = cost;
             }
             if (best >= 0) {
-                const auto middle = std::stable_partition(begin, begin + count, [&](std::uint32_t i) { return bin(i) <= best; });
+                const auto middle = std::partition(begin, begin + count, [&](const Item& item) { return bin(item) <= best; });
                 return static_cast<std::uint32_t>(middle - begin);
             }
         }
@@ -119,10 +141,21 @@ struct Builder {
 BvhTree build_bvh(std::span<const Ellipsoid> ellipsoids) {
     BvhTree tree;
     if (ellipsoids.empty()) return tree;
-    tree.order.resize(ellipsoids.size());
-    std::iota(tree.order.begin(), tree.order.end(), 0u);
-    Builder builder{ellipsoids, tree.order};
-    tree.nodes = builder.build(0, static_cast<std::uint32_t>(ellipsoids.size()), 3);
+    std::vector<Item> items(ellipsoids.size());
+    parallel_chunks(items.size(), 16384, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const Ellipsoid& e = ellipsoids[i];
+            for (int k = 0; k < 3; ++k) {
+                items[i].lo[k] = std::nextafter(static_cast<float>(e.center[k] - e.half[k]), -1e30f);
+                items[i].hi[k] = std::nextafter(static_cast<float>(e.center[k] + e.half[k]), 1e30f);
+            }
+            items[i].index = static_cast<std::uint32_t>(i);
+        }
+    });
+    Builder builder{items};
+    tree.nodes = builder.build(0, static_cast<std::uint32_t>(items.size()), 3);
+    tree.order.resize(items.size());
+    for (std::size_t i = 0; i < items.size(); ++i) tree.order[i] = items[i].index;
     return tree;
 }
 

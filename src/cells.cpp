@@ -31,6 +31,8 @@ using List = Cells::Leaf;
 template <class Candidates>
 List list_of(std::span<const Ellipsoid> ellipsoids, const Candidates& candidates, const Box& box) {
     List list;
+    list.primitives.reserve(candidates.size());
+    list.bounds.reserve(candidates.size());
     for (const std::uint32_t i : candidates) {
         const double bound = box_extinction(ellipsoids[i], box);
         if (!(bound > 0)) continue;
@@ -66,6 +68,7 @@ struct Refiner {
     const CellCosts& costs;
     double allowance;  ///< how much the references of a cell may grow by a split
     std::uint32_t max_levels;
+    double dear;       ///< cost per unit of length from which a split is tried
 
     std::uint32_t leaf(Subtree& out, List&& list) const {
         if (list.primitives.empty()) return 1;
@@ -76,12 +79,8 @@ struct Refiner {
     std::uint32_t refine(Subtree& out, const Box& box, List&& list, std::uint32_t level) const {
         const double size = box.hi.x - box.lo.x;
         const std::size_t n = list.primitives.size();
-        const double groups = std::ceil(static_cast<double>(n) / CLUME_GROUP_SIZE);
         out.depth = std::max(out.depth, level);
-        // Nothing to gain where crossing the cell costs little more than entering it.
-        const double evaluation = costs.null_share * list.majorant * size * costs.tentative +
-                                  costs.chord_share * groups * costs.chord;
-        if (n == 0 || level == max_levels || evaluation < costs.step) return leaf(out, std::move(list));
+        if (n == 0 || level == max_levels || cost(size, n, list.majorant) < dear) return leaf(out, std::move(list));
         List children[8];
         double child_cost = 0;
         std::size_t references = 0;
@@ -104,15 +103,22 @@ struct Refiner {
     }
 };
 
+struct RootChoice {
+    double size;          ///< edge of the root cells
+    double typical_cost;  ///< where the media are, per unit of length
+};
+
 /// Root cell size of least cost at points where the media are, given the most references allowed.
-double choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const Cost& cost, const glm::dvec3& extent, std::size_t max_references) {
+RootChoice choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const Cost& cost, const glm::dvec3& extent, std::size_t max_references) {
     const double longest = std::max({extent.x, extent.y, extent.z});
     const std::size_t n = ellipsoids.size();
-    const std::size_t stride = std::max<std::size_t>(1, n / 20000), samples = std::min<std::size_t>(n, 192);
-    double best_size = longest, best_cost = std::numeric_limits<double>::max();
+    const std::size_t stride = std::max<std::size_t>(1, n / 20000), samples = std::min<std::size_t>(n, 128);
+    RootChoice best{longest, std::numeric_limits<double>::max()};
+    double best_total = std::numeric_limits<double>::max();
     for (double size = longest; size > longest / 1500; size *= 0.84) {
         const glm::dvec3 counts = glm::ceil(extent / size);
-        if (counts.x * counts.y * counts.z > static_cast<double>(kMaxRoots)) break;
+        const double cells = counts.x * counts.y * counts.z;
+        if (cells > static_cast<double>(kMaxRoots)) break;
         double references = 0;
         for (std::size_t i = 0; i < n; i += stride) {
             const glm::dvec3 h = 2.0 * ellipsoids[i].half / size;
@@ -120,10 +126,15 @@ double choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree& tr
         }
         // Boxes overcount ellipsoids by about their volume ratio.
         references *= 0.6 * static_cast<double>(stride);
-        if (references > static_cast<double>(max_references) && size < longest) break;
-        double total = 0;
-        parallel_chunks(1, 1, [&](std::size_t, std::size_t) {
-            for (std::size_t s = 0; s < samples; ++s) {
+        const bool last = references * 1.3 > static_cast<double>(max_references) || cells * 1.7 > static_cast<double>(kMaxRoots);
+        // Lists this long are never worth it while smaller cells are affordable: not even looked at.
+        if (!last && references > 768 * cells) {
+            best.size = size;
+            continue;
+        }
+        std::vector<double> sampled(samples);
+        parallel_chunks(samples, 8, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t s = begin; s < end; ++s) {
                 const Ellipsoid& e = ellipsoids[s * n / samples];
                 // A point inside the support, by a fixed low-discrepancy sequence.
                 const double u = static_cast<double>(s);
@@ -137,15 +148,17 @@ double choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree& tr
                     const double bound = box_extinction(ellipsoids[i], box);
                     if (bound > 0) ++count, majorant += bound;
                 });
-                total += cost(size, count, majorant);
+                sampled[s] = cost(size, count, majorant);
             }
         });
+        double mean = 0;
+        for (const double c : sampled) mean += c / static_cast<double>(samples);
         // Duplicates cost memory and cache: a logarithmic price beyond a cache's worth of references.
-        total *= 1 + 0.05 * std::log2(1 + references / 65536);
-        if (total < best_cost) best_cost = total, best_size = size;
-        if (total > 3 * best_cost) break;
+        const double total = mean * (1 + 0.05 * std::log2(1 + references / 65536));
+        if (total < best_total) best_total = total, best = {size, mean};
+        if (total > 1.5 * best_total || last) break;
     }
-    return best_size;
+    return best;
 }
 
 /// For each empty root, the Chebyshev distance to the nearest root that is not empty (or lies outside), capped.
@@ -190,8 +203,8 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     const glm::dvec3 extent = bounds.hi + margin - cells.origin;
     const Cost cost{costs};
     // The device works with the float of 1 / size: use exactly that here.
-    const double size = choose_root_size(ellipsoids, tree, cost, extent, max_references);
-    cells.root_size = 1.0 / static_cast<double>(static_cast<float>(1.0 / size));
+    const RootChoice choice = choose_root_size(ellipsoids, tree, cost, extent, max_references);
+    cells.root_size = 1.0 / static_cast<double>(static_cast<float>(1.0 / choice.size));
     cells.roots = glm::uvec3(glm::max(glm::ceil(extent / cells.root_size), 1.0));
     const std::size_t roots = static_cast<std::size_t>(cells.roots.x) * cells.roots.y * cells.roots.z;
 
@@ -226,7 +239,7 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     std::uint32_t max_levels = kMaxLevels;
     while (max_levels > 0 && (static_cast<std::uint64_t>(std::max({cells.roots.x, cells.roots.y, cells.roots.z})) << max_levels) > (1u << 22)) --max_levels;
     const double spare = static_cast<double>(max_references) / std::max(1.0, 0.6 * static_cast<double>(candidates.size()));
-    const Refiner refiner{ellipsoids, cost, costs, std::clamp(2.0 * spare, 1.5, 8.0), max_levels};
+    const Refiner refiner{ellipsoids, cost, costs, std::clamp(2.0 * spare, 1.5, 8.0), max_levels, 2.5 * choice.typical_cost};
     std::vector<Subtree> subtrees(roots);
     parallel_chunks(roots, 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t r = begin; r < end; ++r) {

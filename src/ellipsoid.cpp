@@ -55,6 +55,9 @@ std::vector<Ellipsoid> make_ellipsoids(const Scene& scene, const Normalization& 
                 e.center = (p.center - n.center) * n.scale;
                 const glm::dmat3 axes = p.axes * n.scale;
                 whiten(axes, e.w);
+                e.descent[0] = 1 / (e.w[0] * e.w[0]);
+                e.descent[1] = 1 / (e.w[1] * e.w[1] + e.w[3] * e.w[3]);
+                e.descent[2] = 1 / (e.w[2] * e.w[2] + e.w[4] * e.w[4] + e.w[5] * e.w[5]);
                 e.sigma = p.sigma_t * medium.density_scale / n.scale;
                 e.extent = medium.extent;
                 e.medium = static_cast<std::uint32_t>(m);
@@ -87,15 +90,13 @@ double box_distance(const Ellipsoid& e, const Box& box) {
     if (x == e.center) return 0;
     // Coordinate descent on |W (x − μ)|² inside the box ...
     const double* w = e.w;
-    const double m00 = w[0] * w[0], m01 = w[0] * w[1], m02 = w[0] * w[2], m11 = w[1] * w[1] + w[3] * w[3],
-                 m12 = w[1] * w[2] + w[3] * w[4], m22 = w[2] * w[2] + w[4] * w[4] + w[5] * w[5];
-    const double i00 = 1 / m00, i11 = 1 / m11, i22 = 1 / m22;
+    const double m01 = w[0] * w[1], m02 = w[0] * w[2], m12 = w[1] * w[2] + w[3] * w[4];
     glm::dvec3 v = x - e.center;
     const glm::dvec3 lo = box.lo - e.center, hi = box.hi - e.center;
-    for (int sweep = 0; sweep < 3; ++sweep) {
-        v.x = std::clamp(-(m01 * v.y + m02 * v.z) * i00, lo.x, hi.x);
-        v.y = std::clamp(-(m01 * v.x + m12 * v.z) * i11, lo.y, hi.y);
-        v.z = std::clamp(-(m02 * v.x + m12 * v.y) * i22, lo.z, hi.z);
+    for (int sweep = 0; sweep < 2; ++sweep) {
+        v.x = std::clamp(-(m01 * v.y + m02 * v.z) * e.descent[0], lo.x, hi.x);
+        v.y = std::clamp(-(m01 * v.x + m12 * v.z) * e.descent[1], lo.y, hi.y);
+        v.z = std::clamp(-(m02 * v.x + m12 * v.y) * e.descent[2], lo.z, hi.z);
     }
     // ... then the bound that this point's direction certifies: the least of n · W (x − μ) over the box.
     const glm::dvec3 y = apply(w, v);

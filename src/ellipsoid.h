@@ -15,6 +15,7 @@ namespace clume {
 struct Ellipsoid {
     glm::dvec3 center;
     double w[6];             ///< W: rows of the upper triangle, w00 w01 w02 w11 w12 w22; |W (x − center)| = r
+    double descent[3];       ///< 1 / diagonal of WᵀW
     double sigma;            ///< peak extinction, density_scale included, per normalised length
     double extent;           ///< E
     double dilation;         ///< whitened distance by which float evaluation may be off

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+// The sections of `clume bench`. Each asks the session which of its items are wanted, measures those and records them.
+#pragma once
+
+#include "bench/session.h"
+
+namespace clume::bench {
+
+void bench_scenes_section(Session& session);   ///< compare_host.cpp
+void bench_kernels_section(Session& session);  ///< kernels.cpp and groups.cpp
+void bench_specialisation_section(Session& session);
+void bench_scaling_section(Session& session);
+
+}  // namespace clume::bench
