@@ -9,6 +9,12 @@
 #endif
 #define CELL_UNIT (1.0f / (float)(1 << CLUME_CELL_LEVELS))  // edge of a finest cell, in root cells: an exact power of two
 
+#if CLUME_CELL_LEVELS > 0
+#define CELL_IS_INNER(link) (((link) & CELL_INNER) != 0u)
+#else
+#define CELL_IS_INNER(link) 0
+#endif
+
 /// Positions in root cells, as floats that are exact: multiples of 2^-CLUME_CELL_LEVELS below 2^24 of them. Lane w is unused.
 typedef struct {
     float4 origin, direction, inverse, offset;  // t of the plane at position p: fma(p, inverse, offset)
@@ -36,7 +42,7 @@ static void cells_locate(CellWalk* w, int4 at, __global const CellEntry* cells) 
     CellEntry entry = cells[w->root];
     int shift = CLUME_CELL_LEVELS;
 #if CLUME_CELL_LEVELS > 0
-    while (entry.link & CELL_INNER) {
+    while (CELL_IS_INNER(entry.link)) {
         shift -= 1;
         const int4 bit = (at >> (int4)shift) & (int4)1;
         entry = cells[(entry.link & ~CELL_INNER) + (uint)(bit.x + 2 * bit.y + 4 * bit.z)];
@@ -100,7 +106,7 @@ static bool cells_next(CellWalk* w, __constant const RenderParams* params, __glo
         const int4 jump = w->stride & crossed;
         const int root = w->root + jump.x + jump.y + jump.z;
         const CellEntry entry = cells[root];
-        if (entry.link - 2u >= CELL_EMPTY_MAX - 2u && (CLUME_CELL_LEVELS == 0 || !(entry.link & CELL_INNER))) {
+        if (entry.link - 2u >= CELL_EMPTY_MAX - 2u && !CELL_IS_INNER(entry.link)) {
             w->plane += select((float4)0.0f, w->step, crossed);
             w->root = root;
             w->link = entry.link;
