@@ -106,7 +106,7 @@ static bool cells_next(CellWalk* w, __constant const RenderParams* params, __glo
         const int4 jump = w->stride & crossed;
         const int root = w->root + jump.x + jump.y + jump.z;
         const CellEntry entry = cells[root];
-        if (entry.link - 2u >= CELL_EMPTY_MAX - 2u && !CELL_IS_INNER(entry.link)) {
+        if ((entry.link - 2u >= CELL_EMPTY_MAX - 2u) & !CELL_IS_INNER(entry.link)) {
             w->plane += select((float4)0.0f, w->step, crossed);
             w->root = root;
             w->link = entry.link;
