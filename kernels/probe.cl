@@ -48,16 +48,55 @@ __kernel void probe_group(__global const float* groups, __global const float4* r
     }
 }
 
-/// Ray i, two float4: origin with t_end, direction. Free flight by the program's strategy up to t_end: out t (CLUME_INFINITY if it escapes),
-/// primitive (as_uint), transmittance to t_end, groups evaluated (as_uint). what: 1 flight, 2 transmittance, 3 both.
+/// Sum over groups and lanes of one building block's results, `what` a constant: 0 whitened intersection, 1 direct quadratic,
+/// 2 density at along(o, d, t1), 3 depth from the entry or 0 to the exit, 4 flight for optical depth tau from there.
+static float group_work(const uint what, __global const float* groups, uint group_count, float3 o, float3 d, float t1, float tau, uint family, float e2) {
+    vfloat sum = (vfloat)0.0f;
+    const vfloat none = (vfloat)0.0f;
+    for (uint part = 0; part < group_count * CLUME_PARTS; ++part) {
+        __global const float* lanes = groups + (size_t)(part / CLUME_PARTS) * CLUME_GROUP_FLOATS + (part % CLUME_PARTS) * CLUME_WIDTH;
+        if (what == 2) {
+            sum += density_part(lanes, along_s(o, d, t1), family, e2);
+            continue;
+        }
+        Chord c;
+        const vint hit = what == 1 ? intersect_quadratic(lanes, o, d, e2, &c) : intersect(lanes, o, d, e2, &c);
+        const vfloat sigma = vload_row(lanes + 16 * CLUME_ROW_SIGMA), start = vselect(c.t_in, none, c.t_in < none);
+        const vint inside = hit & (start < c.t_out);
+        vfloat value = c.t_out - start;
+        if (what == 3) value = depth_part(&c, sigma, start, vselect(start, c.t_out, inside), family, e2);
+        if (what == 4) value = flight_part(&c, sigma, start, (vfloat)tau, family, e2);
+        sum += vselect(none, value, inside);
+    }
+    float total = 0.0f;
+    for (int lane = 0; lane < CLUME_WIDTH; ++lane) total += ((const float*)&sum)[lane];
+    return total;
+}
+
+/// Every ray (as in probe_group) against every group, for timing: out[ray] = group_work.
+__kernel void probe_group_work(__global const float* groups, __global const float4* rays, __global float* out, uint count, uint group_count, uint family, float e2, uint what) {
+    const uint i = (uint)get_global_id(0);
+    if (i >= count) return;
+    const float3 o = rays[3 * i].xyz, d = rays[3 * i + 1].xyz;
+    const float t1 = rays[3 * i + 1].w, tau = rays[3 * i + 2].x;
+    if (what == 0) out[i] = group_work(0, groups, group_count, o, d, t1, tau, family, e2);
+    if (what == 1) out[i] = group_work(1, groups, group_count, o, d, t1, tau, family, e2);
+    if (what == 2) out[i] = group_work(2, groups, group_count, o, d, t1, tau, family, e2);
+    if (what == 3) out[i] = group_work(3, groups, group_count, o, d, t1, tau, family, e2);
+    if (what == 4) out[i] = group_work(4, groups, group_count, o, d, t1, tau, family, e2);
+}
+
+/// Ray i, two float4: origin with t_end, direction. Free flight by the program's strategy up to t_end: out t
+/// (CLUME_INFINITY if it escapes), primitive (as_uint), transmittance to t_end, groups evaluated (as_uint). what: 1 flight, 2 transmittance, 4 transmittance
+/// by roulette past CLUME_EXACT_DEPTH, as the renderer has it.
 __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4* out, uint count, uint sample, uint what) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
     const float3 o = rays[2 * i].xyz, d = rays[2 * i + 1].xyz;
     const float t_end = rays[2 * i].w;
     float4 r = (float4)(CLUME_INFINITY, as_float(CLUME_NO_PRIMITIVE), 1.0f, 0.0f);
+    Draws draws = {sample, i, 1, (uint2)(params->seed_lo, params->seed_hi)};
     if (what & 1u) {
-        Draws draws = {sample, i, 1, (uint2)(params->seed_lo, params->seed_hi)};
         Flight f = {0.0f, 0, CLUME_NO_PRIMITIVE, 0, 0};
         int result;
         do result = flight_sample(o, d, t_end, &f, &draws, SCENE);
@@ -68,7 +107,8 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
         }
         r.w = as_float(f.work);
     }
-    if (what & 2u) r.z = transmittance_analytic(o, d, t_end, transmittance_limit(CLUME_INFINITY), SCENE);
+    const float roulette = what & 4u ? exponential_s(draw_bits(&draws, 1).x) : CLUME_INFINITY;
+    if (what & 6u) r.z = transmittance_analytic(o, d, t_end, transmittance_limit(roulette), SCENE);
     out[i] = r;
 }
 

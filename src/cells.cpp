@@ -154,7 +154,7 @@ RootChoice choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree
         double mean = 0;
         for (const double c : sampled) mean += c / static_cast<double>(samples);
         // Duplicates cost memory and cache: a logarithmic price beyond a cache's worth of references.
-        const double total = mean * (1 + 0.05 * std::log2(1 + references / 65536));
+        const double total = mean * (1 + 0.15 * std::log2(1 + references / 65536));
         if (total < best_total) best_total = total, best = {size, mean};
         if (total > 1.5 * best_total || last) break;
     }

@@ -104,6 +104,7 @@ ProbeRun<ProbeHit> Probe::rays(std::span<const ProbeRay> rays, std::uint32_t sam
 
 ProbeRun<ProbeHit> Probe::flights(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 1); }
 ProbeRun<ProbeHit> Probe::transmittances(std::span<const ProbeRay> r) { return rays(r, 0, 2); }
+ProbeRun<ProbeHit> Probe::roulette_transmittances(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 4); }
 
 std::vector<ProbeRay> Probe::camera_rays(std::span<const std::uint32_t> pixels, std::uint32_t sample) {
     Impl& s = *impl_;
@@ -122,6 +123,16 @@ std::vector<ProbeChord> Probe::groups(std::span<const ProbeGroupRay> rays, std::
     Buffer<ProbeChord> out(s.queue, rays.size());
     s.run("probe_group", rays.size(), in, by, out, cl_uint(rays.size()), cl_uint(family), e2, cl_uint(quadratic));
     return out.download();
+}
+
+ProbeRun<float> Probe::group_work(GroupWork what, std::span<const ProbeGroupRay> rays, std::span<const float> groups, device::uint family, float e2) {
+    Impl& s = *impl_;
+    Buffer<float> in(s.queue, groups), out(s.queue, rays.size());
+    Buffer<ProbeGroupRay> by(s.queue, rays);
+    ProbeRun<float> result;
+    result.device_s = s.run("probe_group_work", rays.size(), in, by, out, cl_uint(rays.size()), cl_uint(groups.size() / CLUME_GROUP_FLOATS), cl_uint(family), e2, cl_uint(what));
+    result.values = out.download();
+    return result;
 }
 
 std::vector<float> Probe::math(MathFunction f, std::span<const float> x, std::span<const float> y) {

@@ -55,6 +55,9 @@ enum class MathFunction : std::uint32_t {
     acos, from_uint, normalize_x
 };
 
+/// What `group_work` times, over every ray and group.
+enum class GroupWork : std::uint32_t { intersect, intersect_quadratic, density, depth, flight };
+
 /// Values of a launch and the seconds that the kernel ran on the device (code generation excluded).
 template <class T>
 struct ProbeRun {
@@ -76,13 +79,18 @@ public:
 
     /// Free flights by the program's strategy; ray i draws as pixel i, sample `sample`.
     ProbeRun<ProbeHit> flights(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
-    /// Analytic transmittances up to t_end.
+    /// Exact transmittances up to t_end.
     ProbeRun<ProbeHit> transmittances(std::span<const ProbeRay> rays);
+    /// The renderer's estimates: exact up to a depth, by roulette beyond.
+    ProbeRun<ProbeHit> roulette_transmittances(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
     /// Camera rays of film pixels (x + width · y), as the renderer's sample `sample` has them.
     std::vector<ProbeRay> camera_rays(std::span<const std::uint32_t> pixels, std::uint32_t sample = 0);
 
     /// Ray i against group i (176 floats each, layout.h) of one family with squared extent e2; quadratic: rows hold Σ⁻¹.
     std::vector<ProbeChord> groups(std::span<const ProbeGroupRay> rays, std::span<const float> groups, device::uint family, float e2, bool quadratic = false);
+    /// One building block of every ray against every group, for timing: the results summed per ray. Density is taken at t1,
+    /// depth and flight start at the entry or at 0. `intersect_quadratic` takes rows of Σ⁻¹.
+    ProbeRun<float> group_work(GroupWork what, std::span<const ProbeGroupRay> rays, std::span<const float> groups, device::uint family, float e2);
     /// f(x[i], y[i]); integers go in as bits. y may be empty for functions of one argument.
     std::vector<float> math(MathFunction f, std::span<const float> x, std::span<const float> y = {});
 

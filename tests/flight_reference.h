@@ -9,6 +9,8 @@
 #include <numbers>
 #include <vector>
 
+#include "src/bvh.h"
+#include "src/cells.h"
 #include "src/device_scene.h"
 #include "src/probe.h"
 #include "tests/probe_harness.h"
@@ -133,6 +135,60 @@ inline DeviceScene device_scene(Scene scene, const std::string& strategy, const 
     RenderOptions options;
     options.accelerator = accelerator;
     return make_device_scene(scene, options);
+}
+
+/// The scene for `decomposition` on cells much finer than the builder would choose (for chords it likes few large ones), so
+/// that a ray crosses many of them; packed here, by layout.h, apart from the renderer's own packing.
+inline DeviceScene fine_cells(const Scene& scene, double step_cost = 0.5) {
+    DeviceScene out = device_scene(scene, "decomposition", "cells");
+    CellCosts costs;
+    costs.step = step_cost;
+    const Cells cells = build_cells(out.ellipsoids, build_bvh(out.ellipsoids), costs, std::size_t{1} << 20);
+    out.cells.clear();
+    for (const std::uint32_t link : cells.table) out.cells.push_back({link, 0});
+    out.leaves.clear();
+    out.groups.clear();
+    out.group_medium.clear();
+    for (const Cells::Leaf& leaf : cells.leaves) {
+        const auto first = static_cast<device::uint>(out.group_medium.size());
+        for (std::size_t i = 0; i < leaf.primitives.size();) {
+            const std::size_t base = out.groups.size();
+            out.groups.resize(base + CLUME_GROUP_FLOATS);
+            const std::uint32_t medium = out.ellipsoids[leaf.primitives[i]].medium;
+            out.group_medium.push_back(medium);
+            for (std::size_t lane = 0; lane < CLUME_GROUP_SIZE; ++lane) {
+                float* row = out.groups.data() + base + lane;
+                const bool used = i < leaf.primitives.size() && out.ellipsoids[leaf.primitives[i]].medium == medium;
+                const float nothing[] = {1e6f, 2e6f, 3e6f, 1, 0, 0, 1, 0, 1, 0, from_bits(CLUME_NO_PRIMITIVE)};
+                for (std::size_t r = 0; r < CLUME_GROUP_ROWS; ++r) row[16 * r] = nothing[r];
+                if (!used) continue;
+                const Ellipsoid& e = out.ellipsoids[leaf.primitives[i]];
+                for (int k = 0; k < 3; ++k) row[16 * (CLUME_ROW_MU + k)] = static_cast<float>(e.center[k]);
+                for (int k = 0; k < 6; ++k) row[16 * (CLUME_ROW_W + k)] = static_cast<float>(e.w[k]);
+                row[16 * CLUME_ROW_SIGMA] = static_cast<float>(e.sigma);
+                row[16 * CLUME_ROW_ID] = from_bits(leaf.primitives[i]);
+                ++i;
+            }
+        }
+        device::CellLeaf packed{};
+        packed.first_group = first;
+        packed.group_count = static_cast<device::uint>(out.group_medium.size()) - first;
+        out.leaves.push_back(packed);
+    }
+    device::RenderParams& p = out.params;
+    p.cells_origin = {static_cast<float>(cells.origin.x), static_cast<float>(cells.origin.y), static_cast<float>(cells.origin.z), static_cast<float>(1 / cells.root_size)};
+    p.cells_x = cells.roots.x;
+    p.cells_y = cells.roots.y;
+    p.cells_z = cells.roots.z;
+    p.cells_levels = cells.levels;
+    for (auto& [name, value] : out.defines)
+        if (name == "CLUME_CELL_LEVELS") value = std::to_string(cells.levels);
+    return out;
+}
+
+/// "cells", "fine" (the above) or "bvh".
+inline DeviceScene decomposition_scene(const Scene& scene, const std::string& accelerator) {
+    return accelerator == "fine" ? fine_cells(scene) : device_scene(scene, "decomposition", accelerator);
 }
 
 inline ProbeRay ray(const glm::dvec3& o, const glm::dvec3& to, double t_end = 1e30) {

@@ -95,7 +95,7 @@ TEST_CASE("Media.EmissionAndColourPerPrimitiveEqualHost") {
 TEST_CASE("Media.FarAndLargeEqualsHost") {
     // Recentred and scaled before anything is float: neither place nor size matters.
     const double size = 3000;
-    const glm::dvec3 place(2e7, -4e7, 1e7);
+    const glm::dvec3 place(2e10, -4e10, 1e10);
     Scene scene = small(KernelFamily::gaussian, 9);
     scene.camera.origin = scene.camera.origin * size + place;
     scene.camera.target = scene.camera.target * size + place;
@@ -131,6 +131,25 @@ TEST_CASE("Phases.EachEqualsHost") {
     check_against_host("rayleigh_mis", scene, {delta}, {}, 4 * spp);
     scene.lights = {sun()};
     check_against_host("rayleigh", scene, {delta});
+}
+
+TEST_CASE("Phases.SamplingAloneEqualsHost") {
+    // A bright sphere straight ahead and one beside, found by scattering alone, once: the share of each direction counts.
+    Scene scene = small(KernelFamily::gaussian);
+    Light ahead = light_of(LightKind::sphere), beside = light_of(LightKind::sphere);
+    ahead.center = {-0.5, -0.8, 3.4};
+    beside.center = {3, 0.3, 0.2};
+    ahead.radius = beside.radius = 1.6;
+    ahead.radiance = {4, 1, 0};
+    beside.radiance = {0, 1, 4};
+    scene.lights = {ahead, beside};
+    scene.render.light_sampling = LightSampling::phase;
+    scene.render.max_depth = 1;
+    scene.camera.fov_rad = 0.5;
+    for (const Phase& phase : {Phase{PhaseKind::rayleigh, 0}, Phase{PhaseKind::henyey_greenstein, 0.5}}) {
+        scene.media[0].phase = phase;
+        check_against_host("phase_sampling_" + std::to_string(static_cast<int>(phase.kind)), scene, {delta});
+    }
 }
 
 TEST_CASE("Phases.OwnParameterOfEachPrimitiveEqualsHost") {

@@ -74,7 +74,7 @@ TEST_CASE("Binary.BadScenesExitThreeWithOneLineThatNamesThePlace") {
         {with_file("zero.ply"), "", "zero.ply"},
         {with_file("text.ply"), "", "text.ply"},
         {with_file("puff.json"), "", "puff.json"},
-        {with_primitive(R"({ "center": [0,0,0], "scale": 1, "density": 1, "rotation": [0,0,0,0] })"), "bad.json:1:", "rotation"},
+        {with_primitive(R"({ "center": [0,0,0], "scale": 1, "density": 1, "rotation": [0,0,0,0] })"), "bad.json:1:", "quaternion"},
         {with_primitive(R"({ "center": [0,0,0], "covariance": [1,2,0,1,0,1], "density": 1 })"), "bad.json:1:", "covariance"},
         {"{ " + media + ", " + rest.substr(0, rest.find(", \"film\"")) + R"(, "film": { "width": 65536, "height": 65536 }, )" + lights + " }", "", "film"},
         {"{ " + rest + ", " + media + " }", "bad.json", "light"},

@@ -7,7 +7,7 @@
 // Tolerances (γ = 2^-24): the line's place in whitened space is known to ε = 4γ (|W||o − μ| + |t⊥||W||d| + E |W||d|/w), the
 // float error of evaluating W(o − μ) and W d, row by row in absolute values. A chord's ends then move by ε plus what h
 // gets from d² (δh), divided by w. Depths err by what that moves, plus 8e-6 of their own value (erf_between states 4e-6);
-// free flights by 4e-6 of the primitive's whole depth (q and x of erfc_inverse state 1e-6 and 2e-6).
+// free flights by 4e-6 of the primitive's whole depth (erfc and erfc_inverse together).
 #include <array>
 #include <cmath>
 #include <fmt/format.h>

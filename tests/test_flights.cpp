@@ -25,6 +25,7 @@ struct Strategy {
 
 struct FlightP {
     double t, winner;
+    double escape_z = 0;  ///< standard deviations by which more escape than should
 };
 
 /// p-values of `count` flights along one ray.
@@ -54,7 +55,9 @@ FlightP flight_p(Probe& probe, const std::vector<Ellipsoid>& ellipsoids, const P
     // Both totals are the collisions; the escape mass closes them.
     winners.push_back(observed[law.bins]);
     winners_expected.push_back(expected[law.bins]);
-    return {chi_square(observed, expected).p, with_winner ? chi_square(winners, winners_expected).p : 1};
+    const double escape = law.by_bin[law.bins];
+    return {chi_square(observed, expected).p, with_winner ? chi_square(winners, winners_expected).p : 1,
+            (observed[law.bins] - n * escape) / std::sqrt(std::max(n * escape * (1 - escape), 1.0))};
 }
 
 const ProbeRay kRays[] = {ray({0.3, -0.2, -3}, {-0.08, 0.07, 1}), ray({0.05, 0.02, -0.03}, {0.3, -0.9, 0.2}), ray({-0.11, 3, 0.06}, {-0.0, -1, 0.0})};
@@ -64,20 +67,25 @@ const ProbeRay kRays[] = {ray({0.3, -0.2, -3}, {-0.08, 0.07, 1}), ray({0.05, 0.0
 TEST_CASE("Flights.FollowTheMixture", "[kernels]") {
     const std::pair<const char*, std::vector<KernelFamily>> families[] = {
         {"gaussian", {kGaussian}}, {"epanechnikov", {kEpanechnikov}}, {"uniform", {kUniform}}, {"mixed", {kGaussian, kEpanechnikov, kUniform}}};
-    const Strategy strategies[] = {{"decomposition", "cells"}, {"decomposition", "bvh"}, {"delta", "auto"}};
+    const Strategy strategies[] = {{"decomposition", "cells"}, {"decomposition", "fine"}, {"decomposition", "bvh"}, {"delta", "auto"}};
     struct Result {
         std::string what;
         FlightP p;
     };
     std::vector<Result> results;
+    std::map<std::string, std::pair<double, double>> escape;  // sum of z, terms: nine rays together see 1 % of density
     for (const auto& [name, kernels] : families)
         for (const int n : {1, 2, 200})
             for (const Strategy& s : strategies) {
-                const DeviceScene scene = device_scene(overlapping_mixture(kernels, n, 40 + static_cast<unsigned>(n)), s.name, s.accelerator);
+                const Scene mixture = overlapping_mixture(kernels, n, 40 + static_cast<unsigned>(n));
+                const bool delta = std::string(s.name) == "delta";
+                const DeviceScene scene = delta ? device_scene(mixture, s.name, s.accelerator) : decomposition_scene(mixture, s.accelerator);
                 Probe probe(test_device(), scene);
                 std::uint32_t sample = 0;
                 for (const ProbeRay& r : kRays)
-                    results.push_back({fmt::format("{} of {}, {} on {}, ray {}", n, name, s.name, s.accelerator, sample), flight_p(probe, scene.ellipsoids, r, 40000, sample++)});
+                    results.push_back({fmt::format("{} of {}, {} on {}, ray {}", n, name, s.name, s.accelerator, sample), flight_p(probe, scene.ellipsoids, r, 80000, sample++)});
+                auto& [sum, count] = escape[fmt::format("{}, {} on {}", name, s.name, s.accelerator)];
+                for (std::size_t i = results.size() - std::size(kRays); i < results.size(); ++i) sum += results[i].p.escape_z, count += 1;
             }
     const double threshold = reference::sidak_threshold(1e-4, 2 * results.size());
     double least = 1;
@@ -87,7 +95,36 @@ TEST_CASE("Flights.FollowTheMixture", "[kernels]") {
         CHECK(r.p.t > threshold);
         CHECK(r.p.winner > threshold);
     }
+    for (const auto& [what, z] : escape) {
+        INFO(what << ": escape mass off by " << z.first / std::sqrt(z.second) << " standard deviations");
+        CHECK(reference::z_test_p(z.first / std::sqrt(z.second)) > reference::sidak_threshold(1e-4, escape.size()));
+    }
     report(fmt::format("least p {:.2g} of {}, threshold {:.2g}", least, 2 * results.size(), threshold));
+}
+
+TEST_CASE("Flights.ThroughManySmallPrimitives", "[kernels]") {
+    // Thousands of primitives, about 8 over a point: rays cross many cells, most primitives lie elsewhere.
+    std::vector<double> p;
+    std::size_t leaves = 0;
+    for (const KernelFamily k : {kGaussian, kUniform}) {
+        Scene mixture = reference::random_mixture(k, 3000, 21);
+        mixture.lights.clear();
+        for (const Strategy& s : {Strategy{"decomposition", "cells"}, {"decomposition", "fine"}, {"decomposition", "bvh"}, {"delta", "auto"}}) {
+            const bool delta = std::string(s.name) == "delta";
+            const DeviceScene scene = delta ? device_scene(mixture, s.name, s.accelerator) : decomposition_scene(mixture, s.accelerator);
+            leaves = std::max(leaves, scene.leaves.size());
+            Probe probe(test_device(), scene);
+            std::uint32_t sample = 0;
+            for (const ProbeRay& r : kRays) {
+                const FlightP both = flight_p(probe, scene.ellipsoids, r, 40000, sample++);
+                INFO(s.name << " on " << s.accelerator << ", ray " << sample << ": " << both.t << " " << both.winner);
+                p.insert(p.end(), {both.t, both.winner});
+                CHECK(std::min(both.t, both.winner) > reference::sidak_threshold(1e-4, 48));
+            }
+        }
+    }
+    CHECK(p.size() == 48);
+    CHECK(leaves > 1000);
 }
 
 TEST_CASE("Flights.OneGaussian", "[kernels][quick]") {
@@ -119,8 +156,9 @@ TEST_CASE("Flights.AcceleratorsAndWidthsGiveTheSameBits", "[kernels]") {
     const Scene scene = overlapping_mixture({kGaussian, kEpanechnikov, kUniform}, 400, 11);
     std::vector<ProbeHit> first;
     std::size_t collided = 0;
-    for (const char* accelerator : {"cells", "bvh"}) {
-        const DeviceScene packed = device_scene(scene, "decomposition", accelerator);
+    for (const char* accelerator : {"cells", "fine", "bvh"}) {
+        const DeviceScene packed = decomposition_scene(scene, accelerator);
+        if (std::string(accelerator) == "fine") CHECK(packed.leaves.size() > 100);
         for (const int width : kWidths) {
             auto hits = Probe(test_device(), packed, width).flights(rays, 3).values;
             for (ProbeHit& h : hits) h.work = 0;

@@ -67,8 +67,9 @@ TEST_CASE("Transmittance.AcceleratorsAndWidthsGiveTheSameBits", "[kernels]") {
         if (name != "gaussians" && name != "mixed") continue;
         const auto rays = random_rays(4000, 13);
         std::vector<ProbeHit> first;
-        for (const char* accelerator : {"cells", "bvh"}) {
-            const DeviceScene packed = device_scene(scene, "decomposition", accelerator);
+        for (const char* accelerator : {"cells", "fine", "bvh"}) {
+            const DeviceScene packed = decomposition_scene(scene, accelerator);
+            if (std::string(accelerator) == "fine") CHECK(packed.leaves.size() > 100);
             for (const int width : kWidths) {
                 const auto got = Probe(test_device(), packed, width).transmittances(rays).values;
                 if (first.empty()) first = got;
@@ -81,6 +82,34 @@ TEST_CASE("Transmittance.AcceleratorsAndWidthsGiveTheSameBits", "[kernels]") {
     }
 }
 
+TEST_CASE("Transmittance.RouletteKeepsTheMean", "[kernels]") {
+    // Past an optical depth the renderer goes on by roulette: exp(−depth) on average, the same bits on every accelerator.
+    const Scene scene = overlapping_mixture({KernelFamily::gaussian, KernelFamily::uniform}, 200, 18);
+    Scene dense = scene;
+    for (auto& m : dense.media) m.density_scale = 3;
+    std::size_t deep = 0;
+    for (const Scene* s : {&scene, static_cast<const Scene*>(&dense)}) {
+        Probe probe(test_device(), fine_cells(*s)), other(test_device(), device_scene(*s, "decomposition", "bvh"));
+        const auto rays = random_rays(12, 19);
+        const auto exact = probe.transmittances(rays).values;
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            const std::vector<ProbeRay> copies(40000, rays[i]);
+            const auto got = probe.roulette_transmittances(copies).values, same = other.roulette_transmittances(copies).values;
+            double sum = 0, square = 0;
+            for (std::size_t k = 0; k < got.size(); ++k) {
+                if (bits(got[k].transmittance) != bits(same[k].transmittance)) FAIL("ray " << i << " differs between accelerators");
+                sum += static_cast<double>(got[k].transmittance);
+                square += static_cast<double>(got[k].transmittance) * static_cast<double>(got[k].transmittance);
+            }
+            const double n = static_cast<double>(got.size()), mean = sum / n, t = static_cast<double>(exact[i].transmittance), sd = std::sqrt(std::max(square / n - mean * mean, 1e-14) / n);
+            deep += sd > 1e-6;
+            INFO("ray " << i << ": transmittance " << t << ", mean " << mean << " ± " << sd);
+            CHECK(std::abs(mean - t) < 4.5 * std::max(sd, std::sqrt(std::exp(-2.0) * t / n) + 1e-7));
+        }
+    }
+    CHECK(deep > 3);
+}
+
 TEST_CASE("Transmittance.NothingIsLostAtAnyOverlap", "[kernels]") {
     // 2,000 primitives of all sizes over one point, and rays through it.
     Scene scene = overlapping_mixture({KernelFamily::gaussian, KernelFamily::uniform}, 2, 1);
@@ -91,8 +120,8 @@ TEST_CASE("Transmittance.NothingIsLostAtAnyOverlap", "[kernels]") {
             0.01 * glm::dvec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)), glm::dvec3(random.spread(0.05, 0.3), random.spread(0.05, 0.3), random.spread(0.05, 0.3)), 0.003,
             {random.uniform(), random.uniform(), random.uniform()}));
     const ProbeRay rays[] = {ray({0, 0, -1.9}, {0.001, 0.002, 1}), ray({0.003, 0, 0.001}, {0.2, 0.3, -0.5}), ray({0.001, 0.0, 0.0}, {-0.0, 1, 0.0})};
-    for (const char* accelerator : {"cells", "bvh"}) {
-        const DeviceScene packed = device_scene(scene, "decomposition", accelerator);
+    for (const char* accelerator : {"cells", "fine", "bvh"}) {
+        const DeviceScene packed = decomposition_scene(scene, accelerator);
         Probe probe(test_device(), packed);
         const auto got = probe.transmittances(rays).values;
         for (std::size_t i = 0; i < std::size(rays); ++i) {
@@ -131,7 +160,7 @@ TEST_CASE("Transmittance.FarClustersAreAllVisited", "[kernels]") {
         for (int i = 0; i < 30; ++i)
             scene.media[0].primitives.push_back(reference::make_primitive(centers.back() + 0.2 * glm::dvec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)), glm::dvec3(random.spread(0.02, 0.2)), 0.5));
     }
-    const DeviceScene packed = device_scene(scene, "decomposition", "cells"), nulls = device_scene(scene, "delta", "auto");
+    const DeviceScene packed = fine_cells(scene, 5), nulls = device_scene(scene, "delta", "auto");
     std::vector<ProbeRay> rays;
     for (const glm::dvec3& a : centers)
         for (const glm::dvec3& b : centers)

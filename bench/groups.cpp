@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+// One ray against vectors of primitives held in the cache: whitened and direct quadratic intersection, and density, optical
+// depth and free flight of each kernel family. Depths and flights include the whitened intersection.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "bench/kernels.h"
+#include "bench/rays.h"
+#include "tests/reference/analytic_scenes.h"
+
+namespace clume::bench {
+namespace {
+
+constexpr std::size_t kGroups = 32;  // 22 kB: in the first-level cache
+constexpr std::size_t kRays = 4096;
+
+struct Data {
+    std::vector<float> groups, quadratic;
+    std::vector<ProbeGroupRay> rays;
+    float e2 = 0;
+};
+
+/// Ellipsoids of half the unit ball's size about the rays, so that about half of the lanes are hit.
+Data make_data(KernelFamily family) {
+    Scene scene = reference::random_mixture(family, static_cast<int>(kGroups * CLUME_GROUP_SIZE), 3, 60, 2);
+    scene.render.strategy = "decomposition";
+    RenderOptions options;
+    options.accelerator = "bvh";
+    const DeviceScene device = make_device_scene(scene, options);
+    Data data;
+    data.e2 = static_cast<float>(scene.media[0].extent * scene.media[0].extent);
+    data.groups.resize(kGroups * CLUME_GROUP_FLOATS);
+    data.quadratic.resize(data.groups.size());
+    for (std::size_t i = 0; i < device.ellipsoids.size(); ++i) {
+        const Ellipsoid& e = device.ellipsoids[i];
+        const auto put = [&](std::vector<float>& to, std::size_t row, double v) {
+            to[i / CLUME_GROUP_SIZE * CLUME_GROUP_FLOATS + row * CLUME_GROUP_SIZE + i % CLUME_GROUP_SIZE] = static_cast<float>(v);
+        };
+        const double *w = e.w, s[] = {w[0] * w[0], w[0] * w[1], w[0] * w[2], w[1] * w[1] + w[3] * w[3], w[1] * w[2] + w[3] * w[4], w[2] * w[2] + w[4] * w[4] + w[5] * w[5]};
+        for (auto* to : {&data.groups, &data.quadratic}) {
+            for (int k = 0; k < 3; ++k) put(*to, CLUME_ROW_MU + static_cast<std::size_t>(k), e.center[k]);
+            put(*to, CLUME_ROW_SIGMA, e.sigma);
+        }
+        for (std::size_t k = 0; k < 6; ++k) {
+            put(data.groups, CLUME_ROW_W + k, w[k]);
+            put(data.quadratic, CLUME_ROW_W + k, s[k]);  // Σ⁻¹ = Wᵀ W
+        }
+    }
+    std::mt19937_64 engine(5);
+    std::uniform_real_distribution<float> u(0, 1);
+    for (const ProbeRay& r : inside_rays(device, kRays, 4)) {
+        ProbeGroupRay g;
+        for (int k = 0; k < 3; ++k) {
+            g.origin[k] = r.origin[k];
+            g.direction[k] = r.direction[k];
+        }
+        g.t1 = u(engine);
+        g.tau = -std::log(1 - u(engine));
+        data.rays.push_back(g);
+    }
+    return data;
+}
+
+struct Family {
+    KernelFamily kernel;
+    device::uint bit;
+    const char* name;
+};
+
+}  // namespace
+
+void add_group_benchmarks(Session& session) {
+    static constexpr Family families[] = {{KernelFamily::gaussian, FAMILY_GAUSSIAN, "gaussian"},
+                                          {KernelFamily::epanechnikov, FAMILY_EPANECHNIKOV, "epanechnikov"},
+                                          {KernelFamily::uniform, FAMILY_UNIFORM, "uniform"}};
+    static constexpr std::pair<GroupWork, const char*> works[] = {{GroupWork::intersect, "intersect_whitened"},
+                                                                  {GroupWork::intersect_quadratic, "intersect_quadratic"},
+                                                                  {GroupWork::density, "density"},
+                                                                  {GroupWork::depth, "depth"},
+                                                                  {GroupWork::flight, "flight"}};
+    static std::map<device::uint, Data> data;
+    static std::map<int, Probe> probes;
+    for (const Family& family : families)
+        for (const auto& [work, name] : works) {
+            const bool any_family = work == GroupWork::intersect || work == GroupWork::intersect_quadratic;
+            if (any_family && family.bit != FAMILY_GAUSSIAN) continue;
+            for (const int width : kernel_widths(session)) {
+                const std::string item = any_family ? fmt::format("group/{}/w{}", name, width) : fmt::format("group/{}/{}/w{}", name, family.name, width);
+                add_kernel_benchmark(session, item, [&session, family, work = work, width](std::uint32_t) {
+                    auto d = data.find(family.bit);
+                    if (d == data.end()) d = data.emplace(family.bit, make_data(family.kernel)).first;
+                    auto p = probes.find(width);
+                    if (p == probes.end()) p = probes.try_emplace(width, session.device(), width).first;
+                    const auto& groups = work == GroupWork::intersect_quadratic ? d->second.quadratic : d->second.groups;
+                    const auto run = p->second.group_work(work, d->second.rays, groups, family.bit, d->second.e2);
+                    return Launch{static_cast<double>(kRays * kGroups * CLUME_GROUP_SIZE), run.device_s, 0};
+                });
+            }
+        }
+}
+
+}  // namespace clume::bench
