@@ -22,7 +22,7 @@ namespace {
 
 constexpr const char* overview =
     "Measures speed on one device. Sections: scenes (the renderer beside a plain host tracer), kernels, specialisation, scaling.\n"
-    "An item is called section/name: --list prints them, --filter chooses. Everything takes five to six minutes on two cores.\n";
+    "An item is called section/name: --list prints them, --filter chooses. Everything takes five to eight minutes on two cores.\n";
 constexpr const char* examples =
     "Examples: clume bench --filter ^scenes/          clume bench --filter 'flight/ball.*w16'\n"
     "          clume bench --quick --json speed.json";

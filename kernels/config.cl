@@ -4,6 +4,9 @@
 #include "layout.h"
 
 #pragma OPENCL FP_CONTRACT OFF
+#ifdef __clang__  // a specialised program leaves functions unused: that is what it is for
+#pragma clang diagnostic ignored "-Wunused-function"
+#endif
 
 #ifndef CLUME_WIDTH  // primitives per vector: 16, 8, 4 or 1
 #define CLUME_WIDTH 8

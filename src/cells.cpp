@@ -217,15 +217,19 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     };
     std::vector<std::uint64_t> offset(roots + 1, 0);
     const auto n = static_cast<std::uint32_t>(ellipsoids.size());
+    // Slabs of roots, one thread each: every slab looks at all primitives, in order.
     const auto visit = [&](auto&& f) {
-        for (std::uint32_t i = 0; i < n; ++i) {
-            glm::ivec3 lo, hi;
-            range(i, lo, hi);
-            for (int z = lo.z; z <= hi.z; ++z)
-                for (int y = lo.y; y <= hi.y; ++y)
-                    for (int x = lo.x; x <= hi.x; ++x)
-                        f(i, static_cast<std::size_t>(x) + static_cast<std::size_t>(cells.roots.x) * (static_cast<std::size_t>(y) + static_cast<std::size_t>(cells.roots.y) * static_cast<std::size_t>(z)));
-        }
+        parallel_chunks(cells.roots.z, (cells.roots.z + 3) / 4, [&](std::size_t slab_begin, std::size_t slab_end) {
+            for (std::uint32_t i = 0; i < n; ++i) {
+                glm::ivec3 lo, hi;
+                range(i, lo, hi);
+                const int z_lo = std::max(lo.z, static_cast<int>(slab_begin)), z_hi = std::min(hi.z, static_cast<int>(slab_end) - 1);
+                for (int z = z_lo; z <= z_hi; ++z)
+                    for (int y = lo.y; y <= hi.y; ++y)
+                        for (int x = lo.x; x <= hi.x; ++x)
+                            f(i, static_cast<std::size_t>(x) + static_cast<std::size_t>(cells.roots.x) * (static_cast<std::size_t>(y) + static_cast<std::size_t>(cells.roots.y) * static_cast<std::size_t>(z)));
+            }
+        });
     };
     visit([&](std::uint32_t, std::size_t root) { ++offset[root + 1]; });
     for (std::size_t r = 0; r < roots; ++r) offset[r + 1] += offset[r];

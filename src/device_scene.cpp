@@ -312,7 +312,8 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     // Null collisions fly through cells with bounds; everything that sums or inverts chords visits groups, kept by the cells
     // or by the bvh.
     const bool delta = out.strategy == "delta", chords = !delta || lights.nee;
-    const bool bvh = options.accelerator == "bvh" || (options.accelerator == "auto" && delta && chords);
+    // Measured (docs/performance.md): the bvh is ahead for depths everywhere, and for flights where sizes are mixed.
+    const bool bvh = options.accelerator == "bvh" || (options.accelerator == "auto" && chords && out.strategy != "march");
     std::uint32_t stack = 0;
     std::string accelerator;
     if (delta || !bvh) {
@@ -320,7 +321,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
         costs.null_share = delta ? 1 : 0;
         costs.chord_share = bvh || !chords ? 0 : 1;
         const std::size_t n = out.ellipsoids.size();
-        const Cells cells = build_cells(out.ellipsoids, tree, costs, std::max<std::size_t>(std::size_t{2} << 20, 10 * n));
+        const Cells cells = build_cells(out.ellipsoids, tree, costs, std::max<std::size_t>(std::size_t{2} << 20, 8 * n));
         pack_cells(cells, chords && !bvh, delta, out);
         accelerator = fmt::format("{}x{}x{} cells, {} octree levels, {} leaves, {:.1f} references per primitive", cells.roots.x, cells.roots.y,
                                   cells.roots.z, cells.levels, cells.leaves.size(), n ? static_cast<double>(cells.references) / static_cast<double>(n) : 0.0);
