@@ -99,12 +99,13 @@ typedef struct CellLeaf {
     uint first_reference, reference_count;  // delta; else 0
 } CellLeaf;
 
-// One primitive of a cell: it collides here at the rate bound · K(r²) · scale, its bound's share of the cell's majorant
-// being what the alias table gives it.
+// One slot of a cell's alias table over its primitives' bounds, with both primitives that it may stand for: one cache line a
+// tentative collision. A primitive collides at the rate bound · K(r²) · scale, scale = peak / bound having 8 significant bits
+// (a bfloat16; the bound is what is rounded, upwards), so that K · scale <= 1 in this cell.
 typedef struct Reference {
-    uint threshold, other;  // alias table: keep this one if a word is below threshold, else take the other-th of the cell
-    uint primitive;
-    float scale;  // peak / bound: K · scale <= 1 in this cell
+    uint threshold;   // `own` if a word is below it, else `other`
+    uint own, other;  // primitives
+    uint scales;      // upper halves of the floats: own's in the low 16 bits, other's in the high 16
 } Reference;
 
 typedef struct Primitive {

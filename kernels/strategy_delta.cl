@@ -48,13 +48,12 @@ static int flight_delta(float3 o, float3 d, float t_end, Flight* f, const Draws*
             }
             t = min_s(fma(tau, rcp_s(w.majorant), t), end);
             const CellLeaf leaf = leaves[w.link - CELL_EMPTY_MAX];
-            __global const Reference* list = references + leaf.first_reference;
-            const uint slot = uniform_index(slot_bits, leaf.reference_count);
+            const Reference slot = references[leaf.first_reference + uniform_index(slot_bits, leaf.reference_count)];
             // Arithmetic, not a branch: which of the two can't be predicted.
-            const uint other = list[slot].other;
-            const uint chosen = other + (slot - other) * (uint)(threshold_bits < list[slot].threshold);
-            const uint primitive = list[chosen].primitive;
-            const float probability = primitive_kernel(primitives + primitive, fma(t, d.x, o.x), fma(t, d.y, o.y), fma(t, d.z, o.z)) * list[chosen].scale;
+            const uint own = (uint)(threshold_bits < slot.threshold);
+            const uint primitive = slot.other + (slot.own - slot.other) * own;
+            const float scale = as_float((slot.scales << (16u * own)) & 0xffff0000u);
+            const float probability = scale * primitive_kernel(primitives + primitive, fma(t, d.x, o.x), fma(t, d.y, o.y), fma(t, d.z, o.z));
             f->violations += probability > 1.0f ? 1u : 0u;
             f->work += 1u;
             draw += 1;

@@ -2,6 +2,7 @@
 #include "src/cells.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -27,6 +28,12 @@ struct Cost {
 
 using List = Cells::Leaf;
 
+/// The least bound >= `bound` for which peak / bound has 8 significant bits (layout.h, Reference).
+float coarse_bound(double peak, double bound) {
+    const std::uint32_t scale = std::bit_cast<std::uint32_t>(static_cast<float>(peak / std::max(bound, 1e-30 * peak))) & 0xffff0000u;
+    return static_cast<float>(peak / static_cast<double>(std::bit_cast<float>(scale)));
+}
+
 /// The primitives among `candidates` that meet the box, and their bound.
 template <class Candidates>
 List list_of(std::span<const Ellipsoid> ellipsoids, const Candidates& candidates, const Box& box) {
@@ -36,7 +43,7 @@ List list_of(std::span<const Ellipsoid> ellipsoids, const Candidates& candidates
     for (const std::uint32_t i : candidates) {
         const double bound = box_extinction(ellipsoids[i], box);
         if (!(bound > 0)) continue;
-        const float up = std::nextafter(static_cast<float>(bound * (1 + 1e-5)), 1e30f);
+        const float up = coarse_bound(ellipsoids[i].sigma, bound * (1 + 1e-5));
         list.primitives.push_back(i);
         list.bounds.push_back(up);
         list.majorant += static_cast<double>(up);

@@ -2,9 +2,9 @@
 #include "src/device_scene.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <fmt/format.h>
 
 #include "runtime/hash.h"
@@ -24,11 +24,7 @@ device::float4 pack(const glm::dvec3& v, double w = 0) {
 
 bool is_grey(const glm::dvec3& v) { return v.x == v.y && v.y == v.z; }
 
-float as_float(std::uint32_t bits) {
-    float f;
-    std::memcpy(&f, &bits, sizeof f);
-    return f;
-}
+float as_float(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 device::uint family_bit(KernelFamily k) {
     return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
@@ -87,19 +83,28 @@ private:
 /// Alias table (Vose) over the bounds of a cell, into references[first, first + n).
 void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& ellipsoids, device::Reference* out) {
     const std::size_t n = leaf.primitives.size();
+    // Upper half of peak / bound: exact but for the rounding of the quotient, since the bound was chosen for it.
+    const auto scale = [&](std::size_t i) {
+        const auto quotient = static_cast<float>(ellipsoids[leaf.primitives[i]].sigma / static_cast<double>(leaf.bounds[i]));
+        return (std::bit_cast<std::uint32_t>(quotient) + 0x8000u) >> 16;
+    };
     std::vector<double> weight(n);
     std::vector<device::uint> small, large;
+    const auto fill = [&](std::size_t slot, double share, std::size_t other) {
+        out[slot].threshold = static_cast<device::uint>(std::min(share * 0x1p32, 4294967295.0));
+        out[slot].own = leaf.primitives[slot];
+        out[slot].other = leaf.primitives[other];
+        out[slot].scales = scale(slot) | scale(other) << 16;
+    };
     for (std::size_t i = 0; i < n; ++i) {
-        const double bound = static_cast<double>(leaf.bounds[i]);
-        weight[i] = bound * static_cast<double>(n) / leaf.majorant;
-        out[i] = {0xffffffffu, static_cast<device::uint>(i), leaf.primitives[i], static_cast<float>(ellipsoids[leaf.primitives[i]].sigma / bound)};
+        weight[i] = static_cast<double>(leaf.bounds[i]) * static_cast<double>(n) / leaf.majorant;
+        fill(i, 1, i);
         (weight[i] < 1 ? small : large).push_back(static_cast<device::uint>(i));
     }
     while (!small.empty() && !large.empty()) {
         const device::uint s = small.back(), l = large.back();
         small.pop_back();
-        out[s].threshold = static_cast<device::uint>(std::min(weight[s] * 0x1p32, 4294967295.0));
-        out[s].other = l;
+        fill(s, weight[s], l);
         weight[l] -= 1 - weight[s];
         if (weight[l] < 1) {
             large.pop_back();

@@ -225,7 +225,7 @@ TEST_CASE("Film.TooLowABoundIsCounted") {
     const Scene scene = bounded();
     DeviceScene device = make_device_scene(scene, {});
     CHECK(render_device(scene, device, 16).violations == 0);
-    for (device::Reference& r : device.references) r.scale *= 1.6f;
+    for (device::Reference& r : device.references) r.scales += 0x00800080u;  // both twice as large
     CHECK(render_device(scene, device, 16).violations > 100);
 }
 
