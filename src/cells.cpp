@@ -72,7 +72,6 @@ struct Subtree {
 struct Refiner {
     std::span<const Ellipsoid> ellipsoids;
     Cost cost;
-    const CellCosts& costs;
     double allowance;  ///< how much the references of a cell may grow by a split
     std::uint32_t max_levels;
     double dear;       ///< cost per unit of length from which a split is tried
@@ -250,7 +249,7 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     std::uint32_t max_levels = kMaxLevels;
     while (max_levels > 0 && (static_cast<std::uint64_t>(std::max({cells.roots.x, cells.roots.y, cells.roots.z})) << max_levels) > (1u << 22)) --max_levels;
     const double spare = static_cast<double>(max_references) / std::max(1.0, 0.6 * static_cast<double>(candidates.size()));
-    const Refiner refiner{ellipsoids, cost, costs, std::clamp(2.0 * spare, 1.5, 8.0), max_levels, 2.5 * choice.typical_cost};
+    const Refiner refiner{ellipsoids, cost, std::clamp(2.0 * spare, 1.5, 8.0), max_levels, 2.5 * choice.typical_cost};
     std::vector<Subtree> subtrees(roots);
     parallel_chunks(roots, 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t r = begin; r < end; ++r) {

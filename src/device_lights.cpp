@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "src/alias_table.h"
+
 namespace clume {
 namespace {
 
@@ -53,22 +55,9 @@ double add_environment(const Light& light, DeviceScene& out, device::LightInfo& 
     device::AliasEntry* table = out.alias.data() + info.texel_offset;
     for (std::size_t i = 0; i < n; ++i) table[i].pdf_texel = total > 0 ? static_cast<float>(weight[i] / total / static_cast<double>(table[i].pdf_texel)) : 0.0f;
     if (!(total > 0)) return 0;
-    std::vector<std::size_t> small, large;
-    for (std::size_t i = 0; i < n; ++i) {
-        weight[i] *= static_cast<double>(n) / total;
-        (weight[i] < 1 ? small : large).push_back(i);
-    }
-    while (!small.empty() && !large.empty()) {
-        const std::size_t s = small.back(), l = large.back();
-        small.pop_back();
-        table[s].threshold = static_cast<device::uint>(std::min(weight[s] * 0x1p32, 4294967295.0));
-        table[s].other = static_cast<device::uint>(l);
-        weight[l] -= 1 - weight[s];
-        if (weight[l] < 1) {
-            large.pop_back();
-            small.push_back(l);
-        }
-    }
+    for (double& v : weight) v *= static_cast<double>(n) / total;
+    const std::vector<AliasSlot> slots = alias_table(std::move(weight));
+    for (std::size_t i = 0; i < n; ++i) table[i].threshold = slots[i].threshold, table[i].other = slots[i].other;
     return total;
 }
 

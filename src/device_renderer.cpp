@@ -9,7 +9,7 @@ namespace clume {
 namespace {
 
 constexpr std::size_t kLocalSize = 8;
-constexpr unsigned kFirstBatchArg = 13;  // after the scene's buffers
+constexpr unsigned kFirstBatchArg = SceneBuffers::kArgs + 1;  // after the scene and the pixels
 
 }  // namespace
 
@@ -20,19 +20,7 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
     : queue_(info),
       tiles_(tiles),
       film_(film),
-      params_(queue_, std::span(&scene.params, 1)),
-      cells_(queue_, scene.cells),
-      leaves_(queue_, scene.leaves),
-      references_(queue_, scene.references),
-      primitives_(queue_, scene.primitives),
-      nodes_(queue_, scene.nodes),
-      groups_(queue_, scene.groups),
-      group_medium_(queue_, scene.group_medium),
-      media_(queue_, scene.media),
-      shading_(queue_, scene.shading),
-      lights_(queue_, scene.lights),
-      texels_(queue_, scene.texels),
-      alias_(queue_, scene.alias),
+      scene_(queue_, scene),
       pixels_(queue_, pixels),
       unfinished_(queue_, 1),
       wanted_items_(info.type == "gpu" ? std::size_t{2048} * info.compute_units : std::size_t{128} * std::max(1u, info.compute_units)) {
@@ -41,12 +29,13 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
     options.define("CLUME_WIDTH", vector_width_of(info, vector_width));
     const cl::Program program = build_program(queue_, "render.cl", options);
     kernel_ = make_kernel(queue_, program, "render");
-    set_args(queue_, kernel_, 0, params_, cells_, leaves_, references_, primitives_, nodes_, groups_, group_medium_, media_, shading_, lights_, texels_, alias_, pixels_);
+    scene_.bind(queue_, kernel_);
+    set_args(queue_, kernel_, SceneBuffers::kArgs, pixels_);
     // Code is generated at the first launch: pay for it here, on nothing.
     if (!tiles.empty()) {
         states_ = Buffer<device::PathState>(queue_, kLocalSize);
         sums_ = Buffer<std::uint64_t>(queue_, kLocalSize * FILM_WORDS);
-        set_args(queue_, kernel_, kFirstBatchArg + 1, states_, sums_, unfinished_, cl_uint(0), cl_uint(1), cl_uint(1), cl_uint(0), cl_uint(0), cl_uint(0));
+        set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(0), cl_uint(1), cl_uint(1), cl_uint(0), cl_uint(0), cl_uint(0));
         queue_.launch(kernel_, kLocalSize, kLocalSize);
     }
 }
@@ -64,7 +53,7 @@ std::size_t DeviceRenderer::render(const Tile& tile, std::uint32_t begin, std::u
     for (;;) {
         const device::uint none = 0;
         unfinished_.upload(std::span(&none, 1));
-        set_args(queue_, kernel_, kFirstBatchArg + 1, states_, sums_, unfinished_, cl_uint(tile.first), cl_uint(tile.count), cl_uint(splits), cl_uint(begin),
+        set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(tile.first), cl_uint(tile.count), cl_uint(splits), cl_uint(begin),
                  cl_uint(end), resume);
         queue_.launch(kernel_, items, kLocalSize);
         device::uint left = 0;

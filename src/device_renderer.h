@@ -11,6 +11,7 @@
 #include "runtime/queue.h"
 #include "src/device_scene.h"
 #include "src/film.h"
+#include "src/scene_buffers.h"
 
 namespace clume {
 
@@ -35,19 +36,7 @@ private:
     Queue queue_;
     const std::vector<Tile>& tiles_;
     FilmSums& film_;
-    Buffer<device::RenderParams> params_;
-    Buffer<device::CellEntry> cells_;
-    Buffer<device::CellLeaf> leaves_;
-    Buffer<device::Reference> references_;
-    Buffer<device::Primitive> primitives_;
-    Buffer<device::BvhNode> nodes_;
-    Buffer<float> groups_;
-    Buffer<device::uint> group_medium_;
-    Buffer<device::MediumInfo> media_;
-    Buffer<device::float4> shading_;
-    Buffer<device::LightInfo> lights_;
-    Buffer<device::float4> texels_;
-    Buffer<device::AliasEntry> alias_;
+    SceneBuffers scene_;
     Buffer<device::uint> pixels_;
     Buffer<device::PathState> states_;
     Buffer<std::uint64_t> sums_;

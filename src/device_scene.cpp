@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "runtime/hash.h"
+#include "src/alias_table.h"
 #include "src/bvh.h"
 #include "src/cells.h"
 #include "src/device_camera.h"
@@ -80,7 +81,7 @@ private:
     DeviceScene& out_;
 };
 
-/// Alias table (Vose) over the bounds of a cell, into references[first, first + n).
+/// Alias table over the bounds of a cell, into references[first, first + n).
 void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& ellipsoids, device::Reference* out) {
     const std::size_t n = leaf.primitives.size();
     // Upper half of peak / bound: exact but for the rounding of the quotient, since the bound was chosen for it.
@@ -89,28 +90,10 @@ void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& elli
         return (std::bit_cast<std::uint32_t>(quotient) + 0x8000u) >> 16;
     };
     std::vector<double> weight(n);
-    std::vector<device::uint> small, large;
-    const auto fill = [&](std::size_t slot, double share, std::size_t other) {
-        out[slot].threshold = static_cast<device::uint>(std::min(share * 0x1p32, 4294967295.0));
-        out[slot].own = leaf.primitives[slot];
-        out[slot].other = leaf.primitives[other];
-        out[slot].scales = scale(slot) | scale(other) << 16;
-    };
-    for (std::size_t i = 0; i < n; ++i) {
-        weight[i] = static_cast<double>(leaf.bounds[i]) * static_cast<double>(n) / leaf.majorant;
-        fill(i, 1, i);
-        (weight[i] < 1 ? small : large).push_back(static_cast<device::uint>(i));
-    }
-    while (!small.empty() && !large.empty()) {
-        const device::uint s = small.back(), l = large.back();
-        small.pop_back();
-        fill(s, weight[s], l);
-        weight[l] -= 1 - weight[s];
-        if (weight[l] < 1) {
-            large.pop_back();
-            small.push_back(l);
-        }
-    }
+    for (std::size_t i = 0; i < n; ++i) weight[i] = static_cast<double>(leaf.bounds[i]) * static_cast<double>(n) / leaf.majorant;
+    const std::vector<AliasSlot> slots = alias_table(std::move(weight));
+    for (std::size_t i = 0; i < n; ++i)
+        out[i] = {slots[i].threshold, leaf.primitives[i], leaf.primitives[slots[i].other], scale(i) | scale(slots[i].other) << 16};
 }
 
 /// `with_groups`: for strategies that visit every chord; `with_references`: for null collisions.

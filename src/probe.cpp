@@ -8,6 +8,7 @@
 #include "runtime/program.h"
 #include "runtime/queue.h"
 #include "src/device_renderer.h"
+#include "src/scene_buffers.h"
 
 namespace clume {
 namespace {
@@ -35,50 +36,40 @@ std::size_t round_up(std::size_t n, std::size_t to) { return (n + to - 1) / to *
 }  // namespace
 
 struct Probe::Impl {
-    Impl(const DeviceInfo& info, const DeviceScene& scene, const ProgramOptions& options)
+    Impl(const DeviceInfo& info, const DeviceScene& device_scene, const ProgramOptions& options)
         : code(compiled(info, options)),
           queue(code.queue),
-          params(queue, std::span(&scene.params, 1)),
-          cells(queue, scene.cells),
-          leaves(queue, scene.leaves),
-          references(queue, scene.references),
-          primitives(queue, scene.primitives),
-          nodes(queue, scene.nodes),
-          groups(queue, scene.groups),
-          group_medium(queue, scene.group_medium),
-          media(queue, scene.media),
-          shading(queue, scene.shading),
-          lights(queue, scene.lights),
-          texels(queue, scene.texels),
-          alias(queue, scene.alias) {}
+          scene(queue, device_scene) {}
 
     /// Sets the arguments and launches `items` work-items. The first launch of a kernel is preceded by one of a single
     /// work-group, so that the time returned holds no code generation.
     template <class... Args>
     double run(const char* name, std::size_t items, const Args&... args) {
+        return launch(name, items, [&](cl::Kernel& kernel) { set_args(queue, kernel, 0, args...); });
+    }
+
+    /// The same for a kernel whose first arguments are the scene.
+    template <class... Args>
+    double run_in_scene(const char* name, std::size_t items, const Args&... args) {
+        return launch(name, items, [&](cl::Kernel& kernel) {
+            scene.bind(queue, kernel);
+            set_args(queue, kernel, SceneBuffers::kArgs, args...);
+        });
+    }
+
+    template <class SetArgs>
+    double launch(const char* name, std::size_t items, const SetArgs& set) {
         const bool first = code.kernels.find(name) == code.kernels.end();
         if (first) code.kernels.emplace(name, make_kernel(queue, code.program, name));
         cl::Kernel& kernel = code.kernels.at(name);
-        set_args(queue, kernel, 0, args...);
+        set(kernel);
         if (first) queue.launch(kernel, kLocalSize, kLocalSize);
         return queue.launch(kernel, items, kLocalSize);
     }
 
     Compiled& code;
     Queue& queue;
-    Buffer<device::RenderParams> params;
-    Buffer<device::CellEntry> cells;
-    Buffer<device::CellLeaf> leaves;
-    Buffer<device::Reference> references;
-    Buffer<device::Primitive> primitives;
-    Buffer<device::BvhNode> nodes;
-    Buffer<float> groups;
-    Buffer<device::uint> group_medium;
-    Buffer<device::MediumInfo> media;
-    Buffer<device::float4> shading;
-    Buffer<device::LightInfo> lights;
-    Buffer<device::float4> texels;
-    Buffer<device::AliasEntry> alias;
+    SceneBuffers scene;
 };
 
 Probe::Probe(const DeviceInfo& info, const DeviceScene& scene, int width) : width_(vector_width_of(info, width)) {
@@ -96,8 +87,7 @@ ProbeRun<ProbeHit> Probe::rays(std::span<const ProbeRay> rays, std::uint32_t sam
     Buffer<ProbeRay> in(s.queue, rays);
     Buffer<ProbeHit> out(s.queue, rays.size());
     ProbeRun<ProbeHit> result;
-    result.device_s = s.run("probe_ray", rays.size(), s.params, s.cells, s.leaves, s.references, s.primitives, s.nodes, s.groups, s.group_medium, s.media, s.shading, s.lights,
-                            s.texels, s.alias, in, out, cl_uint(rays.size()), cl_uint(sample), cl_uint(what));
+    result.device_s = s.run_in_scene("probe_ray", rays.size(), in, out, cl_uint(rays.size()), cl_uint(sample), cl_uint(what));
     result.values = out.download();
     return result;
 }
@@ -110,8 +100,7 @@ std::vector<ProbeRay> Probe::camera_rays(std::span<const std::uint32_t> pixels, 
     Impl& s = *impl_;
     Buffer<device::uint> in(s.queue, pixels);
     Buffer<ProbeRay> out(s.queue, pixels.size());
-    s.run("probe_camera", pixels.size(), s.params, s.cells, s.leaves, s.references, s.primitives, s.nodes, s.groups, s.group_medium, s.media, s.shading, s.lights, s.texels,
-          s.alias, in, out, cl_uint(pixels.size()), cl_uint(sample));
+    s.run_in_scene("probe_camera", pixels.size(), in, out, cl_uint(pixels.size()), cl_uint(sample));
     return out.download();
 }
 

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// A DeviceScene's buffers on one device, as the first arguments (SCENE_ARGS of kernels/medium.cl) of every kernel that sees
+// the scene.
+#pragma once
+
+#include "runtime/buffer.h"
+#include "runtime/kernel.h"
+#include "runtime/queue.h"
+#include "src/device_scene.h"
+
+namespace clume {
+
+struct SceneBuffers {
+    /// Uploads everything. Throws DeviceError.
+    SceneBuffers(Queue& queue, const DeviceScene& scene)
+        : params(queue, std::span(&scene.params, 1)),
+          cells(queue, scene.cells),
+          leaves(queue, scene.leaves),
+          references(queue, scene.references),
+          primitives(queue, scene.primitives),
+          nodes(queue, scene.nodes),
+          groups(queue, scene.groups),
+          group_medium(queue, scene.group_medium),
+          media(queue, scene.media),
+          shading(queue, scene.shading),
+          lights(queue, scene.lights),
+          texels(queue, scene.texels),
+          alias(queue, scene.alias) {}
+
+    static constexpr unsigned kArgs = 13;  ///< arguments that `bind` sets
+
+    /// Sets arguments 0 to kArgs − 1.
+    void bind(Queue& queue, cl::Kernel& kernel) const {
+        set_args(queue, kernel, 0, params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias);
+    }
+
+    Buffer<device::RenderParams> params;
+    Buffer<device::CellEntry> cells;
+    Buffer<device::CellLeaf> leaves;
+    Buffer<device::Reference> references;
+    Buffer<device::Primitive> primitives;
+    Buffer<device::BvhNode> nodes;
+    Buffer<float> groups;
+    Buffer<device::uint> group_medium;
+    Buffer<device::MediumInfo> media;
+    Buffer<device::float4> shading;
+    Buffer<device::LightInfo> lights;
+    Buffer<device::float4> texels;
+    Buffer<device::AliasEntry> alias;
+};
+
+}  // namespace clume
