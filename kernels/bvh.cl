@@ -41,7 +41,7 @@ static int bvh_push(__global const BvhNode* node, float8 entry, float t_end, uin
     return height;
 }
 
-static void bvh_decompose(float3 o, float3 d, float t_begin, uint2 key, float* best, uint* primitive, uint* work, SCENE_ARGS) {
+static void bvh_decompose(float3 o, float3 d, float t_begin, uint2 key, float* best, uint* primitive, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
     float distance[CLUME_BVH_STACK];
     const float3 inverse = bvh_inverse(d);
@@ -51,43 +51,49 @@ static void bvh_decompose(float3 o, float3 d, float t_begin, uint2 key, float* b
         if (!(distance[height] < *best)) continue;
         const uint child = stack[height];
         if (child & BVH_LEAF) {
-            *work += 1;
+            COUNT(work, WORK_GROUPS, 1);
             group_decompose(child & ~BVH_LEAF, o, d, t_begin, -CLUME_INFINITY, CLUME_INFINITY, key, best, primitive, SCENE);
         } else {
+            COUNT(work, WORK_NODES, 1);
             height = bvh_push(nodes + child, bvh_test(nodes + child, o, inverse, t_begin, *best), *best, stack, distance, height);
         }
     }
 }
 
 /// Optical depth between t_begin and t_end, or any partial sum that has reached `limit`.
-static ulong bvh_depth(float3 o, float3 d, float t_begin, float t_end, ulong limit, SCENE_ARGS) {
+static ulong bvh_depth(float3 o, float3 d, float t_begin, float t_end, ulong limit, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
     const float3 inverse = bvh_inverse(d);
     ulong depth = 0;
     int height = 0;
     uint node = 0;
     for (;;) {
+        COUNT(work, WORK_NODES, 1);
         const float8 entry = bvh_test(nodes + node, o, inverse, t_begin, t_end);
         const float* near = (const float*)&entry;
         for (int i = 0; i < BVH_ARITY; ++i) {
             const uint child = nodes[node].child[i];
             if (child == BVH_NONE || !(near[i] < t_end)) continue;
-            if (child & BVH_LEAF)
+            if (child & BVH_LEAF) {
+                COUNT(work, WORK_GROUPS, 1);
                 depth += group_depth(child & ~BVH_LEAF, o, d, t_begin, t_end, -CLUME_INFINITY, CLUME_INFINITY, SCENE);
-            else
+            } else {
                 stack[height++] = child;
+            }
         }
         if (height == 0 || depth >= limit) return depth;
         node = stack[--height];
     }
 }
 
-static float bvh_density(float3 p, uint* primitive, float u, SCENE_ARGS) {
+static float bvh_density(float3 p, uint* primitive, float u, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
     float sum = 0.0f;
     int height = 0;
     uint node = 0;
+    COUNT(work, WORK_DENSITIES, 1);
     for (;;) {
+        COUNT(work, WORK_NODES, 1);
         for (int i = 0; i < BVH_ARITY; ++i) {
             __global const BvhNode* n = nodes + node;
             const uint child = n->child[i];
@@ -95,6 +101,7 @@ static float bvh_density(float3 p, uint* primitive, float u, SCENE_ARGS) {
                                        p.z >= n->lo_z[i] && p.z <= n->hi_z[i]))
                 continue;
             if (child & BVH_LEAF) {
+                COUNT(work, WORK_GROUPS, 1);
                 const float part = groups_density(child & ~BVH_LEAF, 1, p, SCENE);
                 // Reservoir over the leaves: the newcomer wins with its share, u is stretched back to (0, 1).
                 if (part > 0.0f) {

@@ -4,18 +4,15 @@
 // each cell that its (slightly dilated) support meets, so rounding at cell borders can't lose one.
 #include "ellipsoid.cl"
 
-#ifndef CLUME_CELL_LEVELS  // octree levels below the roots; 0: a plain grid
+#ifndef CLUME_CELL_LEVELS  // octree levels of the mixture's cells below their roots; 0: a plain grid
 #define CLUME_CELL_LEVELS 8
 #endif
-#define CELL_UNIT (1.0f / (float)(1 << CLUME_CELL_LEVELS))  // edge of a finest cell, in root cells: an exact power of two
 
-#if CLUME_CELL_LEVELS > 0
-#define CELL_IS_INNER(link) (((link) & CELL_INNER) != 0u)
-#else
-#define CELL_IS_INNER(link) 0
-#endif
+// `levels` of a table of cells is a constant wherever these functions are called; all of them are inlined there.
+#define CELL_UNIT(levels) (1.0f / (float)(1 << (levels)))  // edge of a finest cell, in root cells: an exact power of two
+#define CELL_IS_INNER(link, levels) ((levels) > 0 && ((link) & CELL_INNER) != 0u)
 
-/// Positions in root cells, as floats that are exact: multiples of 2^-CLUME_CELL_LEVELS below 2^24 of them. Lane w is unused.
+/// Positions in root cells, as floats that are exact: multiples of CELL_UNIT below 2^24 of them. Lane w is unused.
 typedef struct {
     float4 origin, direction, inverse, offset;  // t of the plane at position p: fma(p, inverse, offset)
     float4 step;                                // +1 or −1 per axis
@@ -25,8 +22,8 @@ typedef struct {
     float t_cross;                              // smallest of t_plane
     float size;                                 // present cell's edge
     int root;                                   // index of its root
-    uint link;
-    float majorant;
+    CellEntry entry;                            // of the present cell
+    float size_x, size_y, size_z;               // of the table, in root cells
 } CellWalk;
 
 static void cells_exit(CellWalk* w) {
@@ -35,55 +32,53 @@ static void cells_exit(CellWalk* w) {
     w->t_exit = max_s(w->t, w->t_cross);
 }
 
-/// Sets the cell that holds finest-level position `at`, inside the grid, and when the ray leaves it.
-static void cells_locate(CellWalk* w, int4 at, __global const CellEntry* cells) {
-    const int4 root = at >> (int4)CLUME_CELL_LEVELS;
+/// Sets the cell that holds finest-level position `at`, inside the table, and when the ray leaves it.
+static void cells_locate(CellWalk* w, int4 at, const int levels, __global const CellEntry* cells) {
+    const int4 root = at >> (int4)levels;
     w->root = root.x * (int)abs(w->stride.x) + root.y * (int)abs(w->stride.y) + root.z * (int)abs(w->stride.z);
     CellEntry entry = cells[w->root];
-    int shift = CLUME_CELL_LEVELS;
-#if CLUME_CELL_LEVELS > 0
-    while (CELL_IS_INNER(entry.link)) {
+    int shift = levels;
+    while (CELL_IS_INNER(entry.link, levels)) {
         shift -= 1;
         const int4 bit = (at >> (int4)shift) & (int4)1;
         entry = cells[(entry.link & ~CELL_INNER) + (uint)(bit.x + 2 * bit.y + 4 * bit.z)];
     }
-#endif
     int size = 1 << shift;
     int4 low = (at >> (int4)shift) << (int4)shift;
     // An empty root cell knows how far around it all is empty: leave that whole block at once.
     if (entry.link < CELL_EMPTY_MAX && entry.link > 1u) {
-        const int border = (int)(entry.link - 1u) << CLUME_CELL_LEVELS;
+        const int border = (int)(entry.link - 1u) << levels;
         low -= (int4)border;
         size += 2 * border;
     }
-    w->link = entry.link;
-    w->majorant = entry.majorant;
-    w->size = (float)size * CELL_UNIT;
-    w->plane = (float4)((float)low.x, (float)low.y, (float)low.z, 0.0f) * CELL_UNIT + select((float4)0.0f, (float4)w->size, w->step > (float4)0.0f);
+    w->entry = entry;
+    w->size = (float)size * CELL_UNIT(levels);
+    w->plane = (float4)((float)low.x, (float)low.y, (float)low.z, 0.0f) * CELL_UNIT(levels) + select((float4)0.0f, (float4)w->size, w->step > (float4)0.0f);
     cells_exit(w);
 }
 
-/// Finest-level position of coordinate q (root cells), kept in [low, low + size) and in the grid's [0, n).
-static int cells_position(float q, float low, float size, uint n) {
-    const float last = min_s(low + size, (float)n) - CELL_UNIT;
-    return (int)(min_s(max_s(q, max_s(low, 0.0f)), last) * (float)(1 << CLUME_CELL_LEVELS));
+/// Finest-level position of coordinate q (root cells), kept in [low, low + size) and in the table's [0, count).
+static int cells_position(float q, float low, float size, float count, const int levels) {
+    const float last = min_s(low + size, count) - CELL_UNIT(levels);
+    return (int)(min_s(max_s(q, max_s(low, 0.0f)), last) * (float)(1 << levels));
 }
 
-/// Enters the grid at the first t in [t_begin, t_end) inside it; false if the ray misses it. |d| = 1.
-static bool cells_enter(CellWalk* w, float3 o, float3 d, float t_begin, float t_end, __constant const RenderParams* params, __global const CellEntry* cells) {
-    const float scale = params->cells_origin.w;
-    w->origin = ((float4)(o, 0.0f) - (float4)(params->cells_origin.xyz, 0.0f)) * scale;
-    // An axis along which the ray does not move is given a step of 2^-60: its planes are never the next ones.
-    const float4 magnitude = fabs((float4)(d, 1.0f));
-    w->direction = copysign(select(magnitude, (float4)0x1p-60f, magnitude < (float4)0x1p-60f), (float4)(d, 1.0f)) * scale;
-    w->inverse = (float4)(rcp_s(w->direction.x), rcp_s(w->direction.y), rcp_s(w->direction.z), 0.0f);
+/// Enters a table of count_x × count_y × count_z roots at the first t in [t_begin, t_end) inside it; false if the ray misses
+/// it. Origin and direction are in root cells, and no component of the direction may be 0.
+static bool cells_begin(CellWalk* w, float4 origin, float4 direction, float t_begin, float t_end, uint count_x, uint count_y, uint count_z, const int levels, __global const CellEntry* cells) {
+    w->origin = origin;
+    w->direction = direction;
+    w->inverse = (float4)(rcp_s(direction.x), rcp_s(direction.y), rcp_s(direction.z), 0.0f);
     w->offset = -w->origin * w->inverse;
-    w->step = copysign((float4)1.0f, w->direction);
-    const float4 count = (float4)((float)params->cells_x, (float)params->cells_y, (float)params->cells_z, 0.0f);
+    w->step = copysign((float4)1.0f, direction);
+    const float4 count = (float4)((float)count_x, (float)count_y, (float)count_z, 0.0f);
+    w->size_x = count.x;
+    w->size_y = count.y;
+    w->size_z = count.z;
     const int4 forward = w->step > (float4)0.0f;
-    w->stride = (int4)(1, (int)params->cells_x, (int)(params->cells_x * params->cells_y), 0);
+    w->stride = (int4)(1, (int)count_x, (int)(count_x * count_y), 0);
     w->stride = select(-w->stride, w->stride, forward);
-    // The grid's own planes, by the formula that every cell uses: crossing the last one ends the walk, so no position is
+    // The table's own planes, by the formula that every cell uses: crossing the last one ends the walk, so no position is
     // ever looked up outside.
     const float4 a = fma(select(count, (float4)0.0f, forward), w->inverse, w->offset);
     const float4 b = fma(select((float4)0.0f, count, forward), w->inverse, w->offset);
@@ -91,13 +86,27 @@ static bool cells_enter(CellWalk* w, float3 o, float3 d, float t_begin, float t_
     w->t_end = min_s(t_end, min_s(b.x, min_s(b.y, b.z)));
     if (!(w->t < w->t_end)) return false;
     const float4 q = fma((float4)w->t, w->direction, w->origin);
-    cells_locate(w, (int4)(cells_position(q.x, 0.0f, count.x, params->cells_x), cells_position(q.y, 0.0f, count.y, params->cells_y),
-                           cells_position(q.z, 0.0f, count.z, params->cells_z), 0), cells);
+    cells_locate(w, (int4)(cells_position(q.x, 0.0f, count.x, count.x, levels), cells_position(q.y, 0.0f, count.y, count.y, levels),
+                           cells_position(q.z, 0.0f, count.z, count.z, levels), 0), levels, cells);
     return true;
 }
 
-/// Steps to the next cell; false when the ray ends or leaves the grid.
-static bool cells_next(CellWalk* w, __constant const RenderParams* params, __global const CellEntry* cells) {
+/// A direction in root cells that cells_begin takes: an axis along which the ray does not move is given a step of 2^-60
+/// times `scale`: its planes are never the next ones.
+static float4 cells_direction(float3 d, float scale) {
+    const float4 magnitude = fabs((float4)(d, 1.0f));
+    return copysign(select(magnitude, (float4)0x1p-60f, magnitude < (float4)0x1p-60f), (float4)(d, 1.0f)) * scale;
+}
+
+/// cells_begin for the mixture's cells and a ray in normalised coordinates, |d| = 1.
+static bool cells_enter(CellWalk* w, float3 o, float3 d, float t_begin, float t_end, __constant const RenderParams* params, __global const CellEntry* cells) {
+    const float scale = params->cells_origin.w;
+    const float4 origin = ((float4)(o, 0.0f) - (float4)(params->cells_origin.xyz, 0.0f)) * scale;
+    return cells_begin(w, origin, cells_direction(d, scale), t_begin, t_end, params->cells_x, params->cells_y, params->cells_z, CLUME_CELL_LEVELS, cells);
+}
+
+/// Steps to the next cell; false when the ray ends or leaves the table.
+static bool cells_next(CellWalk* w, const int levels, __global const CellEntry* cells) {
     w->t = w->t_exit;
     if (!(w->t < w->t_end)) return false;
     // Axes whose plane is crossed (two or three at an edge or corner): no branch, which comes next can't be predicted.
@@ -106,11 +115,10 @@ static bool cells_next(CellWalk* w, __constant const RenderParams* params, __glo
         const int4 jump = w->stride & crossed;
         const int root = w->root + jump.x + jump.y + jump.z;
         const CellEntry entry = cells[root];
-        if ((entry.link - 2u >= CELL_EMPTY_MAX - 2u) & !CELL_IS_INNER(entry.link)) {
+        if ((entry.link - 2u >= CELL_EMPTY_MAX - 2u) & !CELL_IS_INNER(entry.link, levels)) {
             w->plane += select((float4)0.0f, w->step, crossed);
             w->root = root;
-            w->link = entry.link;
-            w->majorant = entry.majorant;
+            w->entry = entry;
             cells_exit(w);
             return true;
         }
@@ -119,12 +127,12 @@ static bool cells_next(CellWalk* w, __constant const RenderParams* params, __glo
     const int4 forward = w->step > (float4)0.0f;
     const float4 low = w->plane - select((float4)0.0f, (float4)w->size, forward);
     const float4 q = fma((float4)w->t, w->direction, w->origin);
-    const float4 beyond = (w->plane - select((float4)CELL_UNIT, (float4)0.0f, forward)) * (float)(1 << CLUME_CELL_LEVELS);
+    const float4 beyond = (w->plane - select((float4)CELL_UNIT(levels), (float4)0.0f, forward)) * (float)(1 << levels);
     int4 at;
-    at.x = crossed.x ? (int)beyond.x : cells_position(q.x, low.x, w->size, params->cells_x);
-    at.y = crossed.y ? (int)beyond.y : cells_position(q.y, low.y, w->size, params->cells_y);
-    at.z = crossed.z ? (int)beyond.z : cells_position(q.z, low.z, w->size, params->cells_z);
+    at.x = crossed.x ? (int)beyond.x : cells_position(q.x, low.x, w->size, w->size_x, levels);
+    at.y = crossed.y ? (int)beyond.y : cells_position(q.y, low.y, w->size, w->size_y, levels);
+    at.z = crossed.z ? (int)beyond.z : cells_position(q.z, low.z, w->size, w->size_z, levels);
     at.w = 0;
-    cells_locate(w, at, cells);
+    cells_locate(w, at, levels, cells);
     return true;
 }

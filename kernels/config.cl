@@ -50,8 +50,35 @@
 #define STRATEGY_DECOMPOSITION 1
 #define STRATEGY_DELTA 2
 #define STRATEGY_MARCH 3
+#define STRATEGY_MARCH_ANALYTIC 4
+#define STRATEGY_REGULAR 5
+#define STRATEGY_REGULAR_LINEAR 6
+#define STRATEGY_PROGRESSIVE 7
 #ifndef CLUME_STRATEGY
 #define CLUME_STRATEGY STRATEGY_DECOMPOSITION
+#endif
+#define TRANSMITTANCE_ANALYTIC 1
+#define TRANSMITTANCE_MARCH 2
+#define TRANSMITTANCE_RATIO 3
+#define TRANSMITTANCE_RESIDUAL_RATIO 4
+#define TRANSMITTANCE_BINARY 5
+#ifndef CLUME_TRANSMITTANCE
+#define CLUME_TRANSMITTANCE TRANSMITTANCE_ANALYTIC
+#endif
+#ifndef CLUME_SCENE_BOUND  // 1: null collisions know one bound for the whole mixture; 0: one per cell
+#define CLUME_SCENE_BOUND 0
+#endif
+#ifndef CLUME_BISECTION  // 1: root finding of regular tracking by bisection; 0: safeguarded Newton
+#define CLUME_BISECTION 0
+#endif
+#ifndef CLUME_COUNT  // 1: operations are counted (WORK_*)
+#define CLUME_COUNT 0
+#endif
+#ifndef CLUME_MIXTURE  // 0: the scene has no ellipsoids
+#define CLUME_MIXTURE 1
+#endif
+#ifndef CLUME_GRIDS  // voxel media in the scene
+#define CLUME_GRIDS 0
 #endif
 #define ACCEL_CELLS 1
 #define ACCEL_BVH 2

@@ -66,13 +66,27 @@ struct alignas(16) float4 {
 #define BVH_LEAF 0x80000000u
 #define BVH_NONE 0xffffffffu
 
-// Words of a work-item's film sums: per channel Σx and Σx² (lo, hi), then alpha count, non-finite samples, bound violations.
+// Operations counted where a program is built with CLUME_COUNT: the kinds of work that its time is made of.
+#define WORK_CELLS 0       // steps from cell to cell
+#define WORK_NODES 1       // nodes of the bvh opened (8 boxes each)
+#define WORK_GROUPS 2      // groups of 16 primitives tested against a ray or a point
+#define WORK_PRIMITIVES 3  // primitives evaluated one at a time
+#define WORK_DENSITIES 4   // points at which a density was looked up
+#define WORK_VOXELS 5      // voxels walked through, or looked up
+#define WORK_SEGMENTS 6    // segments of regular tracking
+#define WORK_ROOTS 7       // evaluations by root finding
+#define WORK_DRAWS 8       // blocks of random numbers
+#define WORK_KINDS 9
+
+// Words of a work-item's film sums: per channel Σx and Σx² (lo, hi), then alpha count, non-finite samples, densities above
+// their bound, the share of extinction lost by that (20 fraction bits), and the work of each kind.
 #define FILM_CHANNELS_MAX 3
-#define FILM_WORDS (4 * FILM_CHANNELS_MAX + 4)
 #define FILM_ALPHA (4 * FILM_CHANNELS_MAX)
 #define FILM_NONFINITE (4 * FILM_CHANNELS_MAX + 1)
 #define FILM_VIOLATIONS (4 * FILM_CHANNELS_MAX + 2)
-#define FILM_WORK (4 * FILM_CHANNELS_MAX + 3)
+#define FILM_EXCESS (4 * FILM_CHANNELS_MAX + 3)
+#define FILM_WORK (4 * FILM_CHANNELS_MAX + 4)
+#define FILM_WORDS (4 * FILM_CHANNELS_MAX + 4 + WORK_KINDS)
 
 typedef struct RenderParams {
     // Camera: the point P = plane_c + (x − film_cx) plane_x + (y − film_cy) plane_y near the media; direction likewise.
@@ -91,12 +105,13 @@ typedef struct RenderParams {
 
 typedef struct CellEntry {
     uint link;
-    float majorant;  // sum of the references' bounds; 0 if empty
+    float majorant;         // sum of the references' bounds; 0 if empty
+    uint reference, count;  // leaves: the first reference, and how many; 0 where no strategy needs them
 } CellEntry;
 
 typedef struct CellLeaf {
-    uint first_group, group_count;          // decomposition, analytic transmittance, march; else 0
-    uint first_reference, reference_count;  // delta; else 0
+    uint first_group, group_count;  // 0 where no strategy visits groups by cell
+    float control, pad0;            // lower bound of the extinction, for residual ratio tracking
 } CellLeaf;
 
 // One slot of a cell's alias table over its primitives' bounds, with both primitives that it may stand for: one cache line a
@@ -153,7 +168,7 @@ typedef struct PathState {
 } PathState;
 
 #ifdef __cplusplus
-static_assert(sizeof(RenderParams) == 240 && sizeof(CellEntry) == 8 && sizeof(CellLeaf) == 16 && sizeof(Reference) == 16 && sizeof(Primitive) == 64 && sizeof(BvhNode) == 224 && sizeof(MediumInfo) == 16);
+static_assert(sizeof(RenderParams) == 240 && sizeof(CellEntry) == 16 && sizeof(CellLeaf) == 16 && sizeof(Reference) == 16 && sizeof(Primitive) == 64 && sizeof(BvhNode) == 224 && sizeof(MediumInfo) == 16);
 static_assert(sizeof(LightInfo) == 144 && sizeof(AliasEntry) == 16 && sizeof(PathState) == 80);
 }  // namespace clume::device
 #endif

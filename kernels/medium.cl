@@ -35,11 +35,35 @@ static uint4 draw_bits(const Draws* r, uint draw) { return philox((uint4)(r->sam
 #define FLIGHT_COLLIDED 1
 #define FLIGHT_PAUSED 2
 
-/// A flight under way or ended: t reached, draws used, the primitive it collided with (if CLUME_PER_PRIMITIVE), and how often
-/// the density exceeded its bound; `work` counts groups evaluated.
+/// Operations by kind (WORK_*), if they are counted.
+typedef struct {
+#if CLUME_COUNT
+    ulong n[WORK_KINDS];
+#else
+    uint unused;
+#endif
+} Work;
+#if CLUME_COUNT
+#define COUNT(work, kind, amount) (work)->n[kind] += (ulong)(amount)
+#else
+#define COUNT(work, kind, amount)
+#endif
+
+static void work_clear(Work* work) {
+#if CLUME_COUNT
+    for (int i = 0; i < WORK_KINDS; ++i) work->n[i] = 0;
+#else
+    work->unused = 0;
+#endif
+}
+
+/// A flight under way or ended: t reached, draws used, the primitive it collided with (if CLUME_PER_PRIMITIVE), how often
+/// the density exceeded its bound, and the sum of the shares of density lost by that (20 fraction bits).
 typedef struct {
     float t;
-    uint draw, primitive, violations, work;
+    uint draw, primitive, violations;
+    ulong excess;
+    Work work;
 } Flight;
 
 /// Extinction at p of the groups [first, first + count): lanes add up over the groups, then by fixed pairs.

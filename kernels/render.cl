@@ -14,7 +14,8 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     p.flags = 0;
     p.flight.primitive = CLUME_NO_PRIMITIVE;
     p.flight.violations = 0;
-    p.flight.work = 0;
+    p.flight.excess = 0;
+    work_clear(&p.flight.work);
     if (resume) {
         const PathState s = states[item];
         p.o = s.origin.xyz;
@@ -45,7 +46,10 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
         }
     }
     sum[FILM_VIOLATIONS] = p.flight.violations;
-    sum[FILM_WORK] = p.flight.work;
+    sum[FILM_EXCESS] = p.flight.excess;
+#if CLUME_COUNT
+    for (int i = 0; i < WORK_KINDS; ++i) sum[FILM_WORK + i] = p.flight.work.n[i];
+#endif
     const bool more = p.sample < sample_end;
     if (more) {
         PathState s;

@@ -12,14 +12,15 @@ static int flight_decomposition(float3 o, float3 d, float t_end, Flight* f, cons
     if (cells_enter(&w, o, d, 0.0f, t_end, params, cells)) {
         float lower = -CLUME_INFINITY;
         do {
-            if (w.link >= CELL_EMPTY_MAX) {
-                const CellLeaf leaf = leaves[w.link - CELL_EMPTY_MAX];
+            if (w.entry.link >= CELL_EMPTY_MAX) {
+                const CellLeaf leaf = leaves[w.entry.link - CELL_EMPTY_MAX];
                 for (uint g = leaf.first_group; g < leaf.first_group + leaf.group_count; ++g)
                     group_decompose(g, o, d, 0.0f, lower, w.t_exit, key, &best, &primitive, SCENE);
-                f->work += leaf.group_count;
+                COUNT(&f->work, WORK_GROUPS, leaf.group_count);
+                COUNT(&f->work, WORK_CELLS, 1);
             }
             lower = w.t_exit;
-        } while (best > w.t_exit && cells_next(&w, params, cells));
+        } while (best > w.t_exit && cells_next(&w, CLUME_CELL_LEVELS, cells));
     }
 #else
     bvh_decompose(o, d, 0.0f, key, &best, &primitive, &f->work, SCENE);

@@ -38,24 +38,25 @@ static int flight_delta(float3 o, float3 d, float t_end, Flight* f, const Draws*
     uint slot_bits = first.y, threshold_bits = first.z, accept_bits = first.w;
     float tau = exponential_s(first.x);
     do {
+        COUNT(&f->work, WORK_CELLS, 1);
         float t = w.t;
         const float end = min_s(w.t_exit, w.t_end);
         for (;;) {
-            const float depth = w.majorant * (end - t);
+            const float depth = w.entry.majorant * (end - t);
             if (!(tau < depth)) {
                 tau -= depth;
                 break;
             }
-            t = min_s(fma(tau, rcp_s(w.majorant), t), end);
-            const CellLeaf leaf = leaves[w.link - CELL_EMPTY_MAX];
-            const Reference slot = references[leaf.first_reference + uniform_index(slot_bits, leaf.reference_count)];
+            t = min_s(fma(tau, rcp_s(w.entry.majorant), t), end);
+            const Reference slot = references[w.entry.reference + uniform_index(slot_bits, w.entry.count)];
             // Arithmetic, not a branch: which of the two can't be predicted.
             const uint own = (uint)(threshold_bits < slot.threshold);
             const uint primitive = slot.other + (slot.own - slot.other) * own;
             const float scale = as_float((slot.scales << (16u * own)) & 0xffff0000u);
             const float probability = scale * primitive_kernel(primitives + primitive, fma(t, d.x, o.x), fma(t, d.y, o.y), fma(t, d.z, o.z));
             f->violations += probability > 1.0f ? 1u : 0u;
-            f->work += 1u;
+            COUNT(&f->work, WORK_PRIMITIVES, 1);
+            COUNT(&f->work, WORK_DRAWS, 1);
             draw += 1;
             if (uniform_s(accept_bits) < probability) {
                 f->primitive = primitive;
@@ -73,6 +74,6 @@ static int flight_delta(float3 o, float3 d, float t_end, Flight* f, const Draws*
             accept_bits = bits.w;
             tau = exponential_s(bits.x);
         }
-    } while (cells_next(&w, params, cells));
+    } while (cells_next(&w, CLUME_CELL_LEVELS, cells));
     return FLIGHT_ESCAPED;
 }

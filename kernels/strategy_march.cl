@@ -26,18 +26,19 @@ static int flight_march(float3 o, float3 d, float t_end, Flight* f, const Draws*
         if (!(begin < last)) return FLIGHT_ESCAPED;
 #if CLUME_ACCEL == ACCEL_CELLS
         while (w.t_exit <= middle)
-            if (!cells_next(&w, params, cells)) return FLIGHT_ESCAPED;
-        if (w.link < CELL_EMPTY_MAX) {
+            if (!cells_next(&w, CLUME_CELL_LEVELS, cells)) return FLIGHT_ESCAPED;
+        if (w.entry.link < CELL_EMPTY_MAX) {
             k = max_s(k + 1.0f, floor(divide_s(w.t_exit, step) - 0.5f));
             continue;
         }
-        const CellLeaf leaf = leaves[w.link - CELL_EMPTY_MAX];
+        const CellLeaf leaf = leaves[w.entry.link - CELL_EMPTY_MAX];
         const float3 p = along_s(o, d, middle);
         const float sigma = groups_density(leaf.first_group, leaf.group_count, p, SCENE);
-        f->work += leaf.group_count;
+        COUNT(&f->work, WORK_GROUPS, leaf.group_count);
+        COUNT(&f->work, WORK_DENSITIES, 1);
 #else
         const float3 p = along_s(o, d, middle);
-        const float sigma = bvh_density(p, &f->primitive, uniform_s(bits.y), SCENE);
+        const float sigma = bvh_density(p, &f->primitive, uniform_s(bits.y), &f->work, SCENE);
 #endif
         const float available = sigma * min_s(step, t_end - begin);
         if (tau < available) {

@@ -15,23 +15,25 @@ static ulong transmittance_limit(float e) {
 }
 
 /// Estimate of the transmittance from o along d up to t_end; `limit` from transmittance_limit.
-static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit, SCENE_ARGS) {
+static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit, Work* work, SCENE_ARGS) {
     ulong depth = 0;
 #if CLUME_ACCEL == ACCEL_CELLS
     CellWalk w;
     if (!cells_enter(&w, o, d, 0.0f, t_end, params, cells)) return 1.0f;
     float lower = -CLUME_INFINITY;
     do {
-        if (w.link >= CELL_EMPTY_MAX) {
-            const CellLeaf leaf = leaves[w.link - CELL_EMPTY_MAX];
+        if (w.entry.link >= CELL_EMPTY_MAX) {
+            const CellLeaf leaf = leaves[w.entry.link - CELL_EMPTY_MAX];
             for (uint g = leaf.first_group; g < leaf.first_group + leaf.group_count; ++g)
                 depth += group_depth(g, o, d, 0.0f, t_end, lower, w.t_exit, SCENE);
+            COUNT(work, WORK_GROUPS, leaf.group_count);
             if (depth >= limit) return 0.0f;
         }
+        COUNT(work, WORK_CELLS, 1);
         lower = w.t_exit;
-    } while (cells_next(&w, params, cells));
+    } while (cells_next(&w, CLUME_CELL_LEVELS, cells));
 #else
-    depth = bvh_depth(o, d, 0.0f, t_end, limit, SCENE);
+    depth = bvh_depth(o, d, 0.0f, t_end, limit, work, SCENE);
     if (depth >= limit) return 0.0f;
 #endif
     const ulong exact = (ulong)CLUME_EXACT_DEPTH << 40;

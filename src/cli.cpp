@@ -35,6 +35,8 @@ constexpr std::array key_flags{
     KeyFlag{"--max-depth", "render.max_depth", "N", "most scattering events on a path; -1: no limit"},
     KeyFlag{"--strategy", "render.strategy", "NAME", "distance sampling"},
     KeyFlag{"--transmittance", "render.transmittance", "NAME", "transmittance estimator"},
+    KeyFlag{"--bound", "render.bound", "NAME", "bound of null collisions"},
+    KeyFlag{"--majorant-grid", "render.majorant_grid", "N", "cells along the longest axis of a grid of bounds"},
 };
 
 constexpr const char* overview =

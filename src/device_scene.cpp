@@ -101,6 +101,7 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
     out.leaves.resize(cells.leaves.size());
     GroupWriter writer(out.ellipsoids, out);
     std::size_t groups = 0, references = 0;
+    std::vector<device::uint> first_reference(with_references ? cells.leaves.size() : 0);
     for (std::size_t i = 0; i < cells.leaves.size(); ++i) {
         const Cells::Leaf& leaf = cells.leaves[i];
         device::CellLeaf& l = out.leaves[i];
@@ -111,16 +112,17 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
             groups += l.group_count;
         }
         if (with_references) {
-            l.first_reference = static_cast<device::uint>(references);
-            l.reference_count = static_cast<device::uint>(leaf.primitives.size());
+            first_reference[i] = static_cast<device::uint>(references);
             references += leaf.primitives.size();
         }
     }
     out.cells.resize(cells.table.size());
     for (std::size_t i = 0; i < cells.table.size(); ++i) {
         const device::uint link = cells.table[i];
-        const bool leaf = !(link & CELL_INNER) && link >= CELL_EMPTY_MAX;
-        out.cells[i] = {link, leaf && with_references ? static_cast<float>(cells.leaves[link - CELL_EMPTY_MAX].majorant) : 0.0f};
+        out.cells[i] = {link, 0, 0, 0};
+        if ((link & CELL_INNER) || link < CELL_EMPTY_MAX || !with_references) continue;
+        const std::size_t leaf = link - CELL_EMPTY_MAX;
+        out.cells[i] = {link, static_cast<float>(cells.leaves[leaf].majorant), first_reference[leaf], static_cast<device::uint>(cells.leaves[leaf].primitives.size())};
     }
     if (std::max(groups, references) > 0x7fffffffu) throw RenderError("the cells need more than 2^31 references");
     writer.resize(groups);
@@ -128,7 +130,7 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
     parallel_chunks(cells.leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             if (with_groups) writer.write(out.leaves[i].first_group, cells.leaves[i].primitives);
-            if (with_references) pack_references(cells.leaves[i], out.ellipsoids, out.references.data() + out.leaves[i].first_reference);
+            if (with_references) pack_references(cells.leaves[i], out.ellipsoids, out.references.data() + first_reference[i]);
         }
     });
     if (with_references) {
@@ -289,7 +291,10 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
 
     // Measured (docs/design.md): null collisions under the cells' bounds are the fastest unbiased choice on every benchmark scene.
     out.strategy = r.strategy != "auto" ? r.strategy : "delta";
-    out.transmittance = "analytic";
+    out.transmittance = r.transmittance != "auto" ? r.transmittance : "analytic";
+    if (out.strategy != "delta" && out.strategy != "decomposition" && out.strategy != "march")
+        throw RenderError(fmt::format("{}: strategy {} is not there yet", scene.path, out.strategy));
+    if (out.transmittance != "analytic") throw RenderError(fmt::format("{}: transmittance {} is not there yet", scene.path, out.transmittance));
 
     const auto start = std::chrono::steady_clock::now();
     out.ellipsoids = make_ellipsoids(scene, out.normalization);
@@ -366,6 +371,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     define("CLUME_DEPTH_LIMIT", r.max_depth >= 0);
     define("CLUME_STRATEGY", out.strategy == "delta" ? 2 : out.strategy == "march" ? 3 : 1);
     define("CLUME_ACCEL", bvh ? 2 : 1);
+    define("CLUME_COUNT", options.count_work);
     if (bvh) define("CLUME_BVH_STACK", stack);
     if (!out.cells.empty()) define("CLUME_CELL_LEVELS", out.params.cells_levels);
 

@@ -20,7 +20,9 @@ void FilmSums::add(std::size_t first, std::size_t count, std::size_t splits, std
         p.alpha += w[FILM_ALPHA];
         nonfinite_ += w[FILM_NONFINITE];
         violations_ += w[FILM_VIOLATIONS];
-        work_ += w[FILM_WORK];
+        excess_ += w[FILM_EXCESS];
+        for (int k = 0; k < WORK_KINDS; ++k) work_[static_cast<std::size_t>(k)] += w[FILM_WORK + k];
+        p.tests += 16 * w[FILM_WORK + WORK_GROUPS] + w[FILM_WORK + WORK_PRIMITIVES] + w[FILM_WORK + WORK_VOXELS];
     }
     for (std::size_t i = 0; i < count; ++i) pixels_[first + i].samples += samples;
 }
@@ -29,6 +31,7 @@ FilmSums::Pixel FilmSums::pixel(std::size_t active) const {
     const Sums& s = pixels_[active];
     Pixel out{};
     out.samples = s.samples;
+    out.tests = s.tests;
     if (s.samples == 0) return out;
     const long double n = s.samples, unit = 0x1p-64L;
     for (int c = 0; c < 3; ++c) {

@@ -24,25 +24,28 @@ public:
     struct Pixel {
         double mean[3], variance[3], alpha;  ///< variance: of the mean
         std::uint32_t samples;
+        std::uint64_t tests;                 ///< primitives tested or evaluated, if counted
     };
     Pixel pixel(std::size_t active) const;
 
     std::uint64_t nonfinite() const { return nonfinite_; }
     std::uint64_t violations() const { return violations_; }
-    std::uint64_t work() const { return work_; }
+    double excess() const { return static_cast<double>(excess_) * 0x1p-20; }  ///< Σ over densities above their bound of the share lost
+    const WorkCounts& work() const { return work_; }
 
 private:
     using Sum = unsigned __int128;
     struct Sums {
         Sum x[3]{}, xx[3]{};
-        std::uint64_t alpha = 0;
+        std::uint64_t alpha = 0, tests = 0;
         std::uint32_t samples = 0;
     };
     std::mutex mutex_;
     std::vector<Sums> pixels_;
     int channels_;
     double scale_;
-    std::uint64_t nonfinite_ = 0, violations_ = 0, work_ = 0;
+    std::uint64_t nonfinite_ = 0, violations_ = 0, excess_ = 0;
+    WorkCounts work_{};
 };
 
 }  // namespace clume

@@ -41,7 +41,7 @@ glm::dvec3 background(const Scene& scene) {
     return sum;
 }
 
-RenderImage develop(const Scene& scene, const CropWindow& w, const std::vector<device::uint>& pixels, const FilmSums& film, std::uint32_t samples) {
+RenderImage develop(const Scene& scene, const CropWindow& w, const std::vector<device::uint>& pixels, const FilmSums& film, std::uint32_t samples, bool count_work) {
     RenderImage image;
     image.film_width = scene.film.width;
     image.film_height = scene.film.height;
@@ -51,6 +51,7 @@ RenderImage develop(const Scene& scene, const CropWindow& w, const std::vector<d
     image.alpha.assign(count, 0);
     image.variance.assign(3 * count, 0);
     image.samples.assign(count, samples);
+    if (count_work) image.tests.assign(count, 0);
     const glm::dvec3 b = background(scene);
     for (std::size_t i = 0; i < count; ++i)
         for (int c = 0; c < 3; ++c) image.rgb[3 * i + static_cast<std::size_t>(c)] = static_cast<float>(b[c]);
@@ -64,6 +65,7 @@ RenderImage develop(const Scene& scene, const CropWindow& w, const std::vector<d
         }
         image.alpha[i] = static_cast<float>(p.alpha);
         image.samples[i] = p.samples;
+        if (count_work) image.tests[i] = p.tests;
     }
     return image;
 }
@@ -170,11 +172,12 @@ RenderResult render(const Scene& scene, const RenderOptions& options, const std:
     else empty_samples = stats.samples_max;
     stats.paths = active_paths + stats.empty_pixels * empty_samples;
     stats.nonfinite_samples = film.nonfinite();
-    stats.evaluations = film.work();
+    stats.work = film.work();
+    stats.excess = film.excess();
     stats.bound_violations = film.violations();
     if (stats.bound_violations > 0)
         stats.warnings.push_back(fmt::format("the density exceeded its bound {} times: please report this scene", stats.bound_violations));
-    result.image = develop(scene, window, pixels, film, empty_samples);
+    result.image = develop(scene, window, pixels, film, empty_samples, options.count_work);
     return result;
 }
 

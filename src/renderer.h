@@ -3,6 +3,7 @@
 // adds up the film exactly and returns means. Nothing here reads or writes files.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -11,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/layout.h"
 #include "src/scene.h"
 
 namespace clume {
@@ -29,8 +31,13 @@ struct RenderOptions {
     std::optional<double> time_limit_s;        ///< stop handing out batches after this long; the image holds what was done
     std::uint32_t batch_samples = 0;           ///< samples of a pixel per batch; 0: sized to 100–200 ms by measurement
     int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own
+    bool count_work = false;                   ///< count operations (stats.work, image.tests): costs a few per cent of speed
     std::string accelerator = "auto";          ///< of what visits chords (decomposition, analytic, march): "cells", "bvh" or "auto"
 };
+
+/// Operations by kind: WORK_* of layout.h.
+using WorkCounts = std::array<std::uint64_t, WORK_KINDS>;
+inline constexpr std::array<const char*, WORK_KINDS> work_names = {"cells", "nodes", "groups", "primitives", "densities", "voxels", "segments", "roots", "draws"};
 
 /// What was rendered; arrays cover the crop window, row 0 on top.
 struct RenderImage {
@@ -40,6 +47,7 @@ struct RenderImage {
     std::vector<float> alpha;                  ///< 1 per pixel
     std::vector<float> variance;               ///< of the mean, 3 per pixel (NaN-free; 0 with fewer than 2 samples)
     std::vector<std::uint32_t> samples;        ///< samples held, 1 per pixel
+    std::vector<std::uint64_t> tests;          ///< primitives (or voxels) tested, 1 per pixel; empty unless counted
 };
 
 struct DeviceShare {
@@ -56,7 +64,8 @@ struct RenderStats {
     std::uint64_t nonfinite_samples = 0;       ///< counted, added as 0
     std::uint64_t bound_violations = 0;        ///< density above its majorant; 0 unless a bound was wrong
     std::uint64_t primitives = 0;
-    std::uint64_t evaluations = 0;             ///< primitives (delta) or groups of 16 (else) evaluated in flights
+    WorkCounts work{};                         ///< operations of all paths, if RenderOptions::count_work
+    double excess = 0;                         ///< Σ over the densities above their bound of the share of extinction lost
     std::uint64_t device_bytes = 0;            ///< scene buffers on one device
     std::string layout_hash;                   ///< SHA-256 of the device buffers
     double build_s = 0, compile_s = 0, render_s = 0;

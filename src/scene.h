@@ -39,6 +39,9 @@ struct RenderSettings {
     int rr_depth = 16;   ///< scattering events before roulette may act
     std::string strategy = "auto";
     std::string transmittance = "auto";
+    std::string bound = "auto";           ///< of null collisions: scene, grid, tree
+    std::optional<int> majorant_grid;     ///< cells along the longest axis of the `grid` bound and of `progressive`
+    std::string root_finding = "newton";  ///< of regular tracking among several primitives: newton, bisection
     LightSampling light_sampling = LightSampling::mis;
     std::optional<double> step;  ///< marching only, world units; default: smallest kernel scale / 4
 };
@@ -70,6 +73,36 @@ struct EllipsoidMedium {
     std::string source;       ///< file path as found, or "scene" for a list in the scene file
 };
 
+enum class Interpolation { trilinear, nearest };
+
+/// Scalar samples at the integer points of a lattice, sparse: bricks of 8 × 8 × 8 samples; those not stored hold 0 in a dense
+/// grid, `background` in a sparse one. Finite, ≥ 0. The medium fills, in lattice coordinates,
+///   dense: [lo − ½, hi − ½], samples beyond the border being those on it (clamped);
+///   sparse: [lo − 1, hi] (trilinear) or [lo − ½, hi − ½] (nearest), samples beyond [lo, hi) being `background`.
+struct VoxelGrid {
+    static constexpr int brick = 8;
+    glm::ivec3 lo{0}, hi{0};                   ///< samples lo ≤ i < hi are the grid's own
+    bool sparse = false;
+    float background = 0;
+    glm::dmat3 axes{1};                        ///< world = origin + axes · lattice; transform and `bounds` applied
+    glm::dvec3 origin{0};
+    std::vector<glm::ivec3> brick_origins;     ///< multiples of 8, ascending by (z, y, x), no two equal
+    std::vector<float> values;                 ///< 512 per brick, x fastest; 0 or background outside [lo, hi)
+    std::size_t negative = 0;                  ///< samples below 0 in the file, taken as 0
+};
+
+/// A voxel medium: σ_t = density_scale · density(x), one albedo, emission and phase function for all of it.
+struct GridMedium {
+    VoxelGrid density;
+    std::optional<VoxelGrid> emission_grid;    ///< times `emission`: radiance per unit length [W/m³/sr], wherever density is
+    Interpolation interpolation = Interpolation::trilinear;
+    double density_scale = 1;
+    Phase phase;
+    glm::dvec3 albedo{0.9};
+    glm::dvec3 emission{0};                    ///< source radiance L_e; with an emission_grid its factor
+    std::string source, grid_name;             ///< file, and the grid's name in it (empty where files have one grid)
+};
+
 /// An environment image, row 0 on top, RGB interleaved, width·height·3 floats, linear Rec.709, finite and ≥ 0.
 struct EnvironmentImage {
     int width = 0, height = 0;
@@ -98,6 +131,7 @@ struct Scene {
     Film film;
     RenderSettings render;
     std::vector<EllipsoidMedium> media;
+    std::vector<GridMedium> grids;  ///< media of type `grid`
     std::vector<Light> lights;
 };
 

@@ -143,6 +143,9 @@ RenderSettings read_render(const SectionReader& section) {
     out.rr_depth = static_cast<int>(section.integer("rr_depth"));
     out.strategy = section.text("strategy");
     out.transmittance = section.text("transmittance");
+    out.bound = section.text("bound");
+    if (section.given("majorant_grid")) out.majorant_grid = static_cast<int>(section.integer("majorant_grid"));
+    out.root_finding = section.text("root_finding");
     const std::string sampling = section.text("light_sampling");
     out.light_sampling = sampling == "nee"     ? LightSampling::nee
                          : sampling == "phase" ? LightSampling::phase

@@ -41,8 +41,11 @@ constexpr KeySpec table[] = {
     {"render", "seed", "", T::integer, 0, false, "0", "[0,18446744073709551615]", "", "", "of the random numbers; every bit counts"},
     {"render", "max_depth", "", T::integer, 0, false, "-1", "[-1,2147483647]", "", "", "most scattering events on a path; 0: emission and unscattered light; 1: single scattering; -1: no limit"},
     {"render", "rr_depth", "", T::integer, 0, false, "16", "[0,2147483647]", "", "", "scattering events before roulette may act"},
-    {"render", "strategy", "", T::choice, 0, false, "\"auto\"", "", "auto march decomposition delta", "", "distance sampling; `auto`: the fastest unbiased one"},
-    {"render", "transmittance", "", T::choice, 0, false, "\"auto\"", "", "auto analytic", "", "transmittance estimator; `auto`: the fastest unbiased one"},
+    {"render", "strategy", "", T::choice, 0, false, "\"auto\"", "", "auto march march-analytic regular regular-linear decomposition delta progressive", "", "distance sampling; `auto`: the fastest unbiased one, by a pilot"},
+    {"render", "transmittance", "", T::choice, 0, false, "\"auto\"", "", "auto analytic march ratio residual-ratio binary", "", "transmittance estimator; `auto`: the fastest unbiased one, by a pilot"},
+    {"render", "bound", "", T::choice, 0, false, "\"auto\"", "", "auto scene grid tree", "", "of null collisions: one for the scene, one per cell of a uniform grid, or per node of an octree"},
+    {"render", "majorant_grid", "", T::integer, 0, false, "", "[1,1024]", "", "cells", "along the longest axis of the `grid` bound and of `progressive`; default: by a cost model"},
+    {"render", "root_finding", "", T::choice, 0, false, "\"newton\"", "", "newton bisection", "", "of `regular` where several primitives overlap; both are exact to rounding"},
     {"render", "light_sampling", "", T::choice, 0, false, "\"mis\"", "", "mis nee phase", "", "`mis`: both ways, weighted; `nee`: light sampling alone; `phase`: none, not with point, spot or directional lights"},
     {"render", "step", "", T::number, 0, false, "", "(0,inf)", "", "world units", "of marching only; default: the smallest kernel scale / 4"},
 

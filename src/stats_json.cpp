@@ -78,7 +78,10 @@ std::string stats_to_json(const RenderStats& stats) {
     put_member(out, "empty_pixels", stats.empty_pixels);
     put_member(out, "nonfinite_samples", stats.nonfinite_samples);
     put_member(out, "bound_violations", stats.bound_violations);
-    put_member(out, "evaluations", stats.evaluations);
+    out.Key("work");  // zeros unless counted
+    out.StartObject();
+    for (std::size_t k = 0; k < WORK_KINDS; ++k) put_member(out, work_names[k], stats.work[k]);
+    out.EndObject();
     put_member(out, "primitives", stats.primitives);
     put_member(out, "device_bytes", stats.device_bytes);
     put_member(out, "layout_hash", stats.layout_hash);

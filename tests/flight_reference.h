@@ -145,7 +145,7 @@ inline DeviceScene fine_cells(const Scene& scene, double step_cost = 0.5) {
     costs.step = step_cost;
     const Cells cells = build_cells(out.ellipsoids, build_bvh(out.ellipsoids), costs, std::size_t{1} << 20);
     out.cells.clear();
-    for (const std::uint32_t link : cells.table) out.cells.push_back({link, 0});
+    for (const std::uint32_t link : cells.table) out.cells.push_back({link, 0, 0, 0});
     out.leaves.clear();
     out.groups.clear();
     out.group_medium.clear();

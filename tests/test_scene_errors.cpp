@@ -59,8 +59,8 @@ TEST_CASE("Scene.TypesAndRanges", "[quick]") {
     check_error("\"spp\": 8", "\"max_depth\": -2", "s.json:4:28: ");
     check_error("\"spp\": 8", "\"step\": 0", "s.json:4:23: \"step\" must be in (0,inf), not 0");
     check_error("\"spp\": 8", "\"strategy\": \"dleta\"", "s.json:4:27: unknown strategy \"dleta\"", "did you mean \"delta\"?");
-    check_error("\"spp\": 8", "\"transmittance\": \"ratio\"",
-                "s.json:4:32: unknown transmittance \"ratio\"; known: auto, analytic");
+    check_error("\"spp\": 8", "\"transmittance\": \"tracking\"",
+                "s.json:4:32: unknown transmittance \"tracking\"; known: auto, analytic, march, ratio, residual-ratio, binary");
     check_error("\"radiance\": 1", "\"radiance\": -1", "s.json:9:49: \"radiance\" must be in [0,inf), not -1");
     check_error("\"radiance\": 1", "\"radiance\": [1, 1e999, 1]", "s.json:9:53: number too large");
     check_error("\"radiance\": 1", "\"radiance\": [1, 2]", "s.json:9:49: ");
