@@ -136,3 +136,18 @@ static bool cells_next(CellWalk* w, const int levels, __global const CellEntry* 
     cells_locate(w, at, levels, cells);
     return true;
 }
+
+/// The mixture's cell at p, a point of the table (or just outside it: the nearest cell).
+static CellEntry cells_at(float3 p, __constant const RenderParams* params, __global const CellEntry* cells) {
+    const float scale = params->cells_origin.w;
+    const float3 q = (p - params->cells_origin.xyz) * scale;
+    const float x = (float)params->cells_x, y = (float)params->cells_y, z = (float)params->cells_z;
+    const int4 at = (int4)(cells_position(q.x, 0.0f, x, x, CLUME_CELL_LEVELS), cells_position(q.y, 0.0f, y, y, CLUME_CELL_LEVELS), cells_position(q.z, 0.0f, z, z, CLUME_CELL_LEVELS), 0);
+    const int4 root = at >> (int4)CLUME_CELL_LEVELS;
+    CellEntry entry = cells[root.x + (int)params->cells_x * (root.y + (int)params->cells_y * root.z)];
+    for (int shift = CLUME_CELL_LEVELS - 1; CELL_IS_INNER(entry.link, CLUME_CELL_LEVELS); --shift) {
+        const int4 bit = (at >> (int4)shift) & (int4)1;
+        entry = cells[(entry.link & ~CELL_INNER) + (uint)(bit.x + 2 * bit.y + 4 * bit.z)];
+    }
+    return entry;
+}

@@ -55,7 +55,7 @@ static vint intersect_quadratic(__global const float* part, float3 o, float3 d, 
 }
 
 /// Extinction that each primitive adds at p, 0 outside its support.
-static vfloat density_part(__global const float* part, float3 p, uint family, float e2) {
+static vfloat density_part(__global const float* part, float3 p, uint family, vfloat e2) {
     const vfloat x = p.x - vload_row(part), y = p.y - vload_row(part + 16), z = p.z - vload_row(part + 32);
     const vfloat w00 = vload_row(part + 48), w01 = vload_row(part + 64), w02 = vload_row(part + 80);
     const vfloat w11 = vload_row(part + 96), w12 = vload_row(part + 112), w22 = vload_row(part + 128);
@@ -66,9 +66,9 @@ static vfloat density_part(__global const float* part, float3 p, uint family, fl
     if (family == FAMILY_GAUSSIAN) k = exp_v(-0.5f * r2);
 #endif
 #if CLUME_FAMILIES & FAMILY_EPANECHNIKOV
-    if (family == FAMILY_EPANECHNIKOV) k = fma(r2, (vfloat)(-rcp_s(e2)), (vfloat)1.0f);
+    if (family == FAMILY_EPANECHNIKOV) k = fma(r2, -rcp_v(e2), (vfloat)1.0f);
 #endif
-    return vselect((vfloat)0.0f, k * vload_row(part + 16 * CLUME_ROW_SIGMA), r2 < (vfloat)e2);
+    return vselect((vfloat)0.0f, k * vload_row(part + 16 * CLUME_ROW_SIGMA), r2 < e2);
 }
 
 /// ∫ 2/√π e^(−x²) from x0 to x1 = x0 + delta, |x| <= 6, without cancellation: midpoint series for short intervals, else by
@@ -91,7 +91,7 @@ static vfloat erf_between(vfloat x0, vfloat x1, vfloat delta) {
 }
 
 /// Optical depth of each primitive between t0 and t1 (t0 <= t1, inside its chord).
-static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uint family, float e2) {
+static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uint family, vfloat e2) {
     vfloat depth = sigma * (t1 - t0);  // uniform
 #if CLUME_FAMILIES & FAMILY_GAUSSIAN
     if (family == FAMILY_GAUSSIAN) {
@@ -107,7 +107,7 @@ static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uin
         const vfloat s0 = w_over_h * vselect(t0 - c->t_in, c->t_out - t1, later);
         const vfloat s1 = w_over_h * vselect(t1 - c->t_in, c->t_out - t0, later);
         const vfloat shape = (s0 + s1) - (1.0f / 3.0f) * fma(s0, s0, fma(s0, s1, s1 * s1));
-        const vfloat e = (e2 - c->d2) * rcp_s(e2);  // h² / E²
+        const vfloat e = (e2 - c->d2) * rcp_v(e2);  // h² / E²
         depth = sigma * e * w_over_h * (t1 - t0) * shape * c->h * c->inverse_w;
     }
 #endif
@@ -116,7 +116,7 @@ static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uin
 
 /// t of each primitive's own collision for optical depth tau measured from t0 (inside the chord), or CLUME_INFINITY where its
 /// depth to the exit is less. Clamped to [t0, t_out], so that rounding loses no collision.
-static vfloat flight_part(const Chord* c, vfloat sigma, vfloat t0, vfloat tau, uint family, float e2) {
+static vfloat flight_part(const Chord* c, vfloat sigma, vfloat t0, vfloat tau, uint family, vfloat e2) {
     vfloat t = t0;
     vint collides = sigma > (vfloat)0.0f;
     sigma = vselect((vfloat)1.0f, sigma, collides);
@@ -149,7 +149,7 @@ static vfloat flight_part(const Chord* c, vfloat sigma, vfloat t0, vfloat tau, u
     if (family == FAMILY_EPANECHNIKOV) {
         const vfloat safe_h = vselect((vfloat)0x1p-20f, c->h, c->h > (vfloat)0x1p-20f);
         const vfloat w_over_h = c->w * rcp_v(safe_h);
-        const vfloat step = tau * divide_v((vfloat)e2, sigma * safe_h * safe_h) * w_over_h;  // tau / A
+        const vfloat step = tau * divide_v(e2, sigma * safe_h * safe_h) * w_over_h;  // tau / A
         const vint later = t0 > c->t_perp;
         const vfloat s0 = w_over_h * vselect(t0 - c->t_in, c->t_out - t0, later);
         const vfloat g0 = s0 * s0 * fma(s0, (vfloat)(-1.0f / 3.0f), (vfloat)1.0f);

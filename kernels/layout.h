@@ -9,6 +9,8 @@
 //   cells    CellEntry               root cells, x fastest, then blocks of 8 children
 //   leaves   CellLeaf                per non-empty cell
 //   references Reference             per (cell, primitive): an alias table over the cell's bounds, for null collisions
+//   learned  float                   per non-empty cell: the bound that `progressive` uses in this pass
+//   raised   uint                    per non-empty cell: bits of the highest density above it that was found
 //   primitives Primitive             per primitive, one cache line
 //   nodes    BvhNode                 8-wide bounding volume hierarchy; leaves are groups
 //   media    MediumInfo              per medium
@@ -100,7 +102,8 @@ typedef struct RenderParams {
     uint cells_x, cells_y, cells_z, cells_levels;
     uint film_width, seed_lo, seed_hi, light_count;
     int max_depth, rr_depth;
-    uint pad0, pad1;
+    float scene_bound;  // of the mixture's extinction, anywhere
+    uint pad0;
 } RenderParams;
 
 typedef struct CellEntry {

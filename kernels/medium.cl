@@ -8,8 +8,8 @@
         __global const Reference *references, __global const Primitive *primitives, __global const BvhNode *nodes,    \
         __global const float *groups, __global const uint *group_medium, __global const MediumInfo *media,            \
         __global const float4 *shading, __global const LightInfo *lights, __global const float4 *texels,              \
-        __global const AliasEntry *alias
-#define SCENE params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias
+        __global const AliasEntry *alias, __global const float *learned, __global uint *raised
+#define SCENE params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias, learned, raised
 
 // With one medium, family and extent are constants of the program.
 #if CLUME_ONE_MEDIUM
@@ -74,7 +74,7 @@ static float groups_density(uint first, uint count, float3 p, SCENE_ARGS) {
         const uint family = group_family(g);
         const float e2 = group_extent_squared(g);
         __global const float* part = groups + (size_t)g * CLUME_GROUP_FLOATS;
-        for (int k = 0; k < CLUME_PARTS; ++k) sum[k] += density_part(part + k * CLUME_WIDTH, p, family, e2);
+        for (int k = 0; k < CLUME_PARTS; ++k) sum[k] += density_part(part + k * CLUME_WIDTH, p, family, (vfloat)e2);
     }
     return reduce_lanes(sum);
 }
@@ -86,7 +86,7 @@ static uint groups_pick(uint first, uint count, float3 p, float target, SCENE_AR
     for (uint g = first; g < first + count; ++g) {
         __global const float* part = groups + (size_t)g * CLUME_GROUP_FLOATS;
         for (int k = 0; k < CLUME_PARTS; ++k) {
-            const vfloat density = density_part(part + k * CLUME_WIDTH, p, group_family(g), group_extent_squared(g));
+            const vfloat density = density_part(part + k * CLUME_WIDTH, p, group_family(g), (vfloat)group_extent_squared(g));
             const float* lane = (const float*)&density;
             for (int i = 0; i < CLUME_WIDTH; ++i) {
                 if (!(lane[i] > 0.0f)) continue;
@@ -97,6 +97,16 @@ static uint groups_pick(uint first, uint count, float3 p, float target, SCENE_AR
         }
     }
     return last;
+}
+
+/// The part [t0, t1) of the ray, within [t_begin, t_end), that lies in the media's bounds; false if there is none.
+static bool bounds_clip(float3 o, float3 d, float t_begin, float t_end, float* t0, float* t1, __constant const RenderParams* params) {
+    const float3 inverse = (float3)(rcp_s(copysign(max_s(fabs(d.x), 0x1p-60f), d.x)), rcp_s(copysign(max_s(fabs(d.y), 0x1p-60f), d.y)),
+                                    rcp_s(copysign(max_s(fabs(d.z), 0x1p-60f), d.z)));
+    const float3 a = (params->bounds_min.xyz - o) * inverse, b = (params->bounds_max.xyz - o) * inverse;
+    *t0 = max_s(t_begin, max_s(min_s(a.x, b.x), max_s(min_s(a.y, b.y), min_s(a.z, b.z))));
+    *t1 = min_s(t_end, min_s(max_s(a.x, b.x), min_s(max_s(a.y, b.y), max_s(a.z, b.z))));
+    return *t0 < *t1;
 }
 
 /// Lets each primitive of group g whose chord begins (after t_begin) in [lower, upper) draw its own collision, and keeps the
@@ -113,7 +123,7 @@ static void group_decompose(uint g, float3 o, float3 d, float t_begin, float low
         if (!vany(mask)) continue;
         const vuint id = as_vuint(vload_row(part + 16 * CLUME_ROW_ID));
         const vfloat tau = exponential_v(primitive_bits(id, key));
-        vfloat t = flight_part(&c, vload_row(part + 16 * CLUME_ROW_SIGMA), start, tau, family, e2);
+        vfloat t = flight_part(&c, vload_row(part + 16 * CLUME_ROW_SIGMA), start, tau, family, (vfloat)e2);
         t = vselect((vfloat)CLUME_INFINITY, t, mask);
         if (!vany(t <= (vfloat)*best)) continue;
         const float* lane = (const float*)&t;
@@ -143,7 +153,7 @@ static ulong group_depth(uint g, float3 o, float3 d, float t_begin, float t_end,
         const vfloat stop = vselect(c.t_out, (vfloat)t_end, c.t_out > (vfloat)t_end);
         mask &= (start < stop) & (start >= (vfloat)lower) & (start < (vfloat)upper);
         if (!vany(mask)) continue;
-        vfloat depth = depth_part(&c, vload_row(part + 16 * CLUME_ROW_SIGMA), start, vselect(start, stop, mask), family, e2);
+        vfloat depth = depth_part(&c, vload_row(part + 16 * CLUME_ROW_SIGMA), start, vselect(start, stop, mask), family, (vfloat)e2);
         depth = vselect((vfloat)0.0f, depth, mask);
         depth = vselect(depth, (vfloat)128.0f, depth > (vfloat)128.0f);
         const vfloat magic = (vfloat)12582912.0f;  // adding it rounds to an integer, found in the low bits

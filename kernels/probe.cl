@@ -40,9 +40,9 @@ __kernel void probe_group(__global const float* groups, __global const float4* r
         r[0] = c.d2;
         r[1] = vselect((vfloat)CLUME_INFINITY, c.t_in, hit);
         r[2] = vselect((vfloat)CLUME_INFINITY, c.t_out, hit);
-        r[3] = density_part(part, along_s(o, d, t0), family, e2);
-        r[4] = vselect(none, depth_part(&c, sigma, start, vselect(start, stop, inside), family, e2), inside);
-        r[5] = vselect((vfloat)CLUME_INFINITY, flight_part(&c, sigma, start, (vfloat)tau, family, e2), inside);
+        r[3] = density_part(part, along_s(o, d, t0), family, (vfloat)e2);
+        r[4] = vselect(none, depth_part(&c, sigma, start, vselect(start, stop, inside), family, (vfloat)e2), inside);
+        r[5] = vselect((vfloat)CLUME_INFINITY, flight_part(&c, sigma, start, (vfloat)tau, family, (vfloat)e2), inside);
         for (int q = 0; q < 6; ++q)
             for (int lane = 0; lane < CLUME_WIDTH; ++lane) out[((size_t)i * 6 + (size_t)q) * 16 + (size_t)(k * CLUME_WIDTH + lane)] = ((const float*)&r[q])[lane];
     }
@@ -56,7 +56,7 @@ static float group_work(const uint what, __global const float* groups, uint grou
     for (uint part = 0; part < group_count * CLUME_PARTS; ++part) {
         __global const float* lanes = groups + (size_t)(part / CLUME_PARTS) * CLUME_GROUP_FLOATS + (part % CLUME_PARTS) * CLUME_WIDTH;
         if (what == 2) {
-            sum += density_part(lanes, along_s(o, d, t1), family, e2);
+            sum += density_part(lanes, along_s(o, d, t1), family, (vfloat)e2);
             continue;
         }
         Chord c;
@@ -64,8 +64,8 @@ static float group_work(const uint what, __global const float* groups, uint grou
         const vfloat sigma = vload_row(lanes + 16 * CLUME_ROW_SIGMA), start = vselect(c.t_in, none, c.t_in < none);
         const vint inside = hit & (start < c.t_out);
         vfloat value = c.t_out - start;
-        if (what == 3) value = depth_part(&c, sigma, start, vselect(start, c.t_out, inside), family, e2);
-        if (what == 4) value = flight_part(&c, sigma, start, (vfloat)tau, family, e2);
+        if (what == 3) value = depth_part(&c, sigma, start, vselect(start, c.t_out, inside), family, (vfloat)e2);
+        if (what == 4) value = flight_part(&c, sigma, start, (vfloat)tau, family, (vfloat)e2);
         sum += vselect(none, value, inside);
     }
     float total = 0.0f;
@@ -88,7 +88,7 @@ __kernel void probe_group_work(__global const float* groups, __global const floa
 
 /// Ray i, two float4: origin with t_end, direction. Free flight by the program's strategy up to t_end: out t
 /// (CLUME_INFINITY if it escapes), primitive (as_uint), transmittance to t_end, groups and single primitives evaluated (as_uint; 0 unless counted). what: 1 flight, 2 transmittance, 4 transmittance
-/// by roulette past CLUME_EXACT_DEPTH, as the renderer has it.
+/// by roulette past CLUME_EXACT_DEPTH, 8 transmittance by the program's estimator.
 __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4* out, uint count, uint sample, uint what) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
@@ -98,12 +98,12 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
     Draws draws = {sample, i, 1, (uint2)(params->seed_lo, params->seed_hi)};
     Flight f;
     work_clear(&f.work);
+    f.t = 0.0f;
+    f.draw = 0;
+    f.primitive = CLUME_NO_PRIMITIVE;
+    f.violations = 0;
+    f.excess = 0;
     if (what & 1u) {
-        f.t = 0.0f;
-        f.draw = 0;
-        f.primitive = CLUME_NO_PRIMITIVE;
-        f.violations = 0;
-        f.excess = 0;
         int result;
         do result = flight_sample(o, d, t_end, &f, &draws, SCENE);
         while (result == FLIGHT_PAUSED);
@@ -113,6 +113,7 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
         }
     }
     const float roulette = what & 4u ? exponential_s(draw_bits(&draws, 1).x) : CLUME_INFINITY;
+    if (what & 8u) r.z = transmittance_estimate(o, d, t_end, draw_bits(&draws, 1).x, &draws, &f, SCENE);
     if (what & 6u) r.z = transmittance_analytic(o, d, t_end, transmittance_limit(roulette), &f.work, SCENE);
 #if CLUME_COUNT
     r.w = as_float((uint)(f.work.n[WORK_GROUPS] + f.work.n[WORK_PRIMITIVES]));

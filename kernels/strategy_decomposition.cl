@@ -30,3 +30,49 @@ static int flight_decomposition(float3 o, float3 d, float t_end, Flight* f, cons
     f->primitive = primitive;
     return FLIGHT_COLLIDED;
 }
+
+/// Whether any primitive's own collision comes before t_end: the flight above, ended at the first that is found.
+static bool decomposition_blocks(float3 o, float3 d, float t_end, uint2 key, Work* work, SCENE_ARGS) {
+    float best = t_end;
+    uint primitive = CLUME_NO_PRIMITIVE;
+#if CLUME_ACCEL == ACCEL_CELLS
+    CellWalk w;
+    if (!cells_enter(&w, o, d, 0.0f, t_end, params, cells)) return false;
+    float lower = -CLUME_INFINITY;
+    do {
+        COUNT(work, WORK_CELLS, 1);
+        if (w.entry.link >= CELL_EMPTY_MAX) {
+            const CellLeaf leaf = leaves[w.entry.link - CELL_EMPTY_MAX];
+            for (uint g = leaf.first_group; g < leaf.first_group + leaf.group_count; ++g) {
+                COUNT(work, WORK_GROUPS, 1);
+                group_decompose(g, o, d, 0.0f, lower, w.t_exit, key, &best, &primitive, SCENE);
+                if (primitive != CLUME_NO_PRIMITIVE) return true;
+            }
+        }
+        lower = w.t_exit;
+    } while (cells_next(&w, CLUME_CELL_LEVELS, cells));
+    return false;
+#else
+    uint stack[CLUME_BVH_STACK];
+    const float3 inverse = bvh_inverse(d);
+    int height = 0;
+    uint node = 0;
+    for (;;) {
+        COUNT(work, WORK_NODES, 1);
+        const float8 entry = bvh_test(nodes + node, o, inverse, 0.0f, t_end);
+        for (int i = 0; i < BVH_ARITY; ++i) {
+            const uint child = nodes[node].child[i];
+            if (child == BVH_NONE || !(((const float*)&entry)[i] < t_end)) continue;
+            if (child & BVH_LEAF) {
+                COUNT(work, WORK_GROUPS, 1);
+                group_decompose(child & ~BVH_LEAF, o, d, 0.0f, -CLUME_INFINITY, CLUME_INFINITY, key, &best, &primitive, SCENE);
+                if (primitive != CLUME_NO_PRIMITIVE) return true;
+            } else {
+                stack[height++] = child;
+            }
+        }
+        if (height == 0) return false;
+        node = stack[--height];
+    }
+#endif
+}

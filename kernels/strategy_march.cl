@@ -2,6 +2,18 @@
 // `march`: fixed steps from the ray's origin, the extinction of a step's middle held constant over it. The simplest
 // baseline, biased by the step. Empty cells are skipped a whole number of steps at a time.
 #include "bvh.cl"
+#include "strategy_delta.cl"
+
+/// Extinction at p.
+static float march_density(float3 p, Work* work, SCENE_ARGS) {
+#if CLUME_ACCEL == ACCEL_CELLS
+    CellEntry cell;
+    return point_density(p, &cell, work, SCENE);
+#else
+    uint unused;
+    return bvh_density(p, &unused, 0.5f, work, SCENE);
+#endif
+}
 
 static int flight_march(float3 o, float3 d, float t_end, Flight* f, const Draws* r, SCENE_ARGS) {
     const float step = params->march_step;

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <queue>
 
 #include "src/parallel.h"
 
@@ -22,7 +23,8 @@ struct Cost {
         const double visits = 1.5 / size;
         const double null = visits * c.step + majorant * c.tentative;
         const double chord = visits * (c.step + groups * c.chord);
-        return c.null_share * null + c.chord_share * chord;
+        const double density = visits * c.step + majorant * (c.tentative + groups * 0.5 * c.chord);
+        return c.null_share * null + c.chord_share * chord + c.density_share * density;
     }
 };
 
@@ -75,9 +77,12 @@ struct Refiner {
     double allowance;  ///< how much the references of a cell may grow by a split
     std::uint32_t max_levels;
     double dear;       ///< cost per unit of length from which a split is tried
+    bool control;
 
-    std::uint32_t leaf(Subtree& out, List&& list) const {
+    std::uint32_t leaf(Subtree& out, List&& list, const Box& box) const {
         if (list.primitives.empty()) return 1;
+        if (control)
+            for (const std::uint32_t i : list.primitives) list.control += box_extinction_least(ellipsoids[i], box);
         out.leaves.push_back(std::move(list));
         return CELL_EMPTY_MAX + static_cast<std::uint32_t>(out.leaves.size() - 1);
     }
@@ -86,7 +91,7 @@ struct Refiner {
         const double size = box.hi.x - box.lo.x;
         const std::size_t n = list.primitives.size();
         out.depth = std::max(out.depth, level);
-        if (n == 0 || level == max_levels || cost(size, n, list.majorant) < dear) return leaf(out, std::move(list));
+        if (n == 0 || level == max_levels || cost(size, n, list.majorant) < dear) return leaf(out, std::move(list), box);
         List children[8];
         double child_cost = 0;
         std::size_t references = 0;
@@ -98,7 +103,7 @@ struct Refiner {
         const double own = cost(size, n, list.majorant);
         const bool crowded = n > 64 * CLUME_GROUP_SIZE && references < 4 * n;
         if (!crowded && (child_cost > 0.55 * own || static_cast<double>(references) > allowance * static_cast<double>(n)))
-            return leaf(out, std::move(list));
+            return leaf(out, std::move(list), box);
         const std::size_t block = out.blocks.size() / 8;
         out.blocks.resize(out.blocks.size() + 8);
         for (int k = 0; k < 8; ++k) {
@@ -199,7 +204,8 @@ void measure_emptiness(Cells& cells) {
 
 }  // namespace
 
-Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const CellCosts& costs, std::size_t max_references) {
+Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const CellOptions& options) {
+    const std::size_t max_references = options.max_references;
     Cells cells;
     cells.table = {1};
     if (ellipsoids.empty()) return cells;
@@ -207,9 +213,10 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     const double margin = 1e-4 * glm::length(bounds.hi - bounds.lo);
     cells.origin = glm::dvec3(glm::vec3(bounds.lo - margin));
     const glm::dvec3 extent = bounds.hi + margin - cells.origin;
-    const Cost cost{costs};
+    const Cost cost{options.costs};
     // The device works with the float of 1 / size: use exactly that here.
-    const RootChoice choice = choose_root_size(ellipsoids, tree, cost, extent, max_references);
+    const double longest = std::max({extent.x, extent.y, extent.z});
+    const RootChoice choice = options.roots ? RootChoice{longest / *options.roots, 0} : choose_root_size(ellipsoids, tree, cost, extent, max_references);
     cells.root_size = 1.0 / static_cast<double>(static_cast<float>(1.0 / choice.size));
     cells.roots = glm::uvec3(glm::max(glm::ceil(extent / cells.root_size), 1.0));
     const std::size_t roots = static_cast<std::size_t>(cells.roots.x) * cells.roots.y * cells.roots.z;
@@ -246,10 +253,10 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     }
 
     // As deep as integers at the finest level stay exact in float.
-    std::uint32_t max_levels = kMaxLevels;
+    std::uint32_t max_levels = std::min(options.max_levels, kMaxLevels);
     while (max_levels > 0 && (static_cast<std::uint64_t>(std::max({cells.roots.x, cells.roots.y, cells.roots.z})) << max_levels) > (1u << 22)) --max_levels;
     const double spare = static_cast<double>(max_references) / std::max(1.0, 0.6 * static_cast<double>(candidates.size()));
-    const Refiner refiner{ellipsoids, cost, std::clamp(2.0 * spare, 1.5, 8.0), max_levels, 2.5 * choice.typical_cost};
+    const Refiner refiner{ellipsoids, cost, std::clamp(2.0 * spare, 1.5, 8.0), max_levels, 2.5 * choice.typical_cost, options.control};
     std::vector<Subtree> subtrees(roots);
     parallel_chunks(roots, 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t r = begin; r < end; ++r) {
@@ -282,6 +289,37 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     }
     measure_emptiness(cells);
     return cells;
+}
+
+double scene_bound(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree) {
+    if (ellipsoids.empty()) return 0;
+    struct Candidate {
+        double bound;
+        Box box;
+        bool operator<(const Candidate& other) const { return bound < other.bound; }
+    };
+    double highest = 0;  // density found at a box's middle
+    const auto bounded = [&](const Box& box) {
+        Candidate c{0, box};
+        const glm::dvec3 middle = 0.5 * (box.lo + box.hi);
+        const Box point{middle, middle};
+        double here = 0;
+        tree.overlapping(ellipsoids, box, [&](std::uint32_t i) {
+            c.bound += box_extinction(ellipsoids[i], box);
+            here += box_extinction(ellipsoids[i], point);
+        });
+        highest = std::max(highest, here);
+        return c;
+    };
+    std::priority_queue<Candidate> queue;
+    queue.push(bounded(bounds_of(ellipsoids)));
+    for (int split = 0; split < 4000 / 8; ++split) {
+        const Candidate top = queue.top();
+        if (top.bound <= 1.02 * highest) break;
+        queue.pop();
+        for (int k = 0; k < 8; ++k) queue.push(bounded(octant(top.box, k)));
+    }
+    return queue.top().bound * (1 + 1e-5);
 }
 
 }  // namespace clume

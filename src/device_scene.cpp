@@ -8,13 +8,12 @@
 #include <fmt/format.h>
 
 #include "runtime/hash.h"
-#include "src/alias_table.h"
 #include "src/bvh.h"
 #include "src/cells.h"
 #include "src/device_camera.h"
 #include "src/device_lights.h"
+#include "src/device_mixture.h"
 #include "src/error.h"
-#include "src/parallel.h"
 
 namespace clume {
 namespace {
@@ -26,150 +25,6 @@ device::float4 pack(const glm::dvec3& v, double w = 0) {
 bool is_grey(const glm::dvec3& v) { return v.x == v.y && v.y == v.z; }
 
 float as_float(std::uint32_t bits) { return std::bit_cast<float>(bits); }
-
-device::uint family_bit(KernelFamily k) {
-    return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
-}
-
-/// Device groups out of lists of primitives: each list is cut by medium, then into sixteens.
-class GroupWriter {
-public:
-    GroupWriter(const std::vector<Ellipsoid>& ellipsoids, DeviceScene& out) : ellipsoids_(ellipsoids), out_(out) {}
-
-    /// Number of groups that a list (ascending, so by medium) takes.
-    std::size_t count(const std::vector<std::uint32_t>& list) const {
-        std::size_t groups = 0;
-        for (std::size_t i = 0; i < list.size(); i += length(list, i)) ++groups;
-        return groups;
-    }
-
-    void resize(std::size_t groups) {
-        out_.groups.resize(groups * CLUME_GROUP_FLOATS);
-        out_.group_medium.resize(groups);
-    }
-
-    void write(std::size_t group, const std::vector<std::uint32_t>& list) {
-        for (std::size_t i = 0; i < list.size(); ++group) {
-            const std::size_t n = length(list, i);
-            float* row = out_.groups.data() + group * CLUME_GROUP_FLOATS;
-            out_.group_medium[group] = ellipsoids_[list[i]].medium;
-            for (std::size_t lane = 0; lane < CLUME_GROUP_SIZE; ++lane) {
-                const auto put = [&](int r, float v) { row[static_cast<std::size_t>(r) * CLUME_GROUP_SIZE + lane] = v; };
-                if (lane >= n) {
-                    // Nothing there: far away, unlike in each axis, without extinction.
-                    const float pad[] = {1e6f, 2.7e6f, -3.1e6f, 1, 0, 0, 1, 0, 1, 0, as_float(CLUME_NO_PRIMITIVE)};
-                    for (int r = 0; r < CLUME_GROUP_ROWS; ++r) put(r, pad[r]);
-                    continue;
-                }
-                const Ellipsoid& e = ellipsoids_[list[i + lane]];
-                for (int k = 0; k < 3; ++k) put(CLUME_ROW_MU + k, static_cast<float>(e.center[k]));
-                for (int k = 0; k < 6; ++k) put(CLUME_ROW_W + k, static_cast<float>(e.w[k]));
-                put(CLUME_ROW_SIGMA, static_cast<float>(e.sigma));
-                put(CLUME_ROW_ID, as_float(list[i + lane]));
-            }
-            i += n;
-        }
-    }
-
-private:
-    std::size_t length(const std::vector<std::uint32_t>& list, std::size_t i) const {
-        std::size_t n = 1;
-        while (n < CLUME_GROUP_SIZE && i + n < list.size() && ellipsoids_[list[i + n]].medium == ellipsoids_[list[i]].medium) ++n;
-        return n;
-    }
-    const std::vector<Ellipsoid>& ellipsoids_;
-    DeviceScene& out_;
-};
-
-/// Alias table over the bounds of a cell, into references[first, first + n).
-void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& ellipsoids, device::Reference* out) {
-    const std::size_t n = leaf.primitives.size();
-    // Upper half of peak / bound: exact but for the rounding of the quotient, since the bound was chosen for it.
-    const auto scale = [&](std::size_t i) {
-        const auto quotient = static_cast<float>(ellipsoids[leaf.primitives[i]].sigma / static_cast<double>(leaf.bounds[i]));
-        return (std::bit_cast<std::uint32_t>(quotient) + 0x8000u) >> 16;
-    };
-    std::vector<double> weight(n);
-    for (std::size_t i = 0; i < n; ++i) weight[i] = static_cast<double>(leaf.bounds[i]) * static_cast<double>(n) / leaf.majorant;
-    const std::vector<AliasSlot> slots = alias_table(std::move(weight));
-    for (std::size_t i = 0; i < n; ++i)
-        out[i] = {slots[i].threshold, leaf.primitives[i], leaf.primitives[slots[i].other], scale(i) | scale(slots[i].other) << 16};
-}
-
-/// `with_groups`: for strategies that visit every chord; `with_references`: for null collisions.
-void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out) {
-    out.leaves.resize(cells.leaves.size());
-    GroupWriter writer(out.ellipsoids, out);
-    std::size_t groups = 0, references = 0;
-    std::vector<device::uint> first_reference(with_references ? cells.leaves.size() : 0);
-    for (std::size_t i = 0; i < cells.leaves.size(); ++i) {
-        const Cells::Leaf& leaf = cells.leaves[i];
-        device::CellLeaf& l = out.leaves[i];
-        l = {};
-        if (with_groups) {
-            l.first_group = static_cast<device::uint>(groups);
-            l.group_count = static_cast<device::uint>(writer.count(leaf.primitives));
-            groups += l.group_count;
-        }
-        if (with_references) {
-            first_reference[i] = static_cast<device::uint>(references);
-            references += leaf.primitives.size();
-        }
-    }
-    out.cells.resize(cells.table.size());
-    for (std::size_t i = 0; i < cells.table.size(); ++i) {
-        const device::uint link = cells.table[i];
-        out.cells[i] = {link, 0, 0, 0};
-        if ((link & CELL_INNER) || link < CELL_EMPTY_MAX || !with_references) continue;
-        const std::size_t leaf = link - CELL_EMPTY_MAX;
-        out.cells[i] = {link, static_cast<float>(cells.leaves[leaf].majorant), first_reference[leaf], static_cast<device::uint>(cells.leaves[leaf].primitives.size())};
-    }
-    if (std::max(groups, references) > 0x7fffffffu) throw RenderError("the cells need more than 2^31 references");
-    writer.resize(groups);
-    out.references.resize(references);
-    parallel_chunks(cells.leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            if (with_groups) writer.write(out.leaves[i].first_group, cells.leaves[i].primitives);
-            if (with_references) pack_references(cells.leaves[i], out.ellipsoids, out.references.data() + first_reference[i]);
-        }
-    });
-    if (with_references) {
-        out.primitives.resize(out.ellipsoids.size());
-        parallel_chunks(out.ellipsoids.size(), 4096, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) {
-                const Ellipsoid& e = out.ellipsoids[i];
-                device::Primitive& p = out.primitives[i];
-                p = {};
-                for (int k = 0; k < 3; ++k) p.mu[k] = static_cast<float>(e.center[k]);
-                for (int k = 0; k < 6; ++k) p.w[k] = static_cast<float>(e.w[k]);
-                p.sigma = static_cast<float>(e.sigma);
-                p.extent_squared = static_cast<float>(e.extent * e.extent);
-                p.family = family_bit(e.family);
-                p.medium = e.medium;
-            }
-        });
-    }
-    device::RenderParams& p = out.params;
-    p.cells_origin = pack(cells.origin, 1.0 / cells.root_size);
-    p.cells_x = cells.roots.x;
-    p.cells_y = cells.roots.y;
-    p.cells_z = cells.roots.z;
-    p.cells_levels = cells.levels;
-}
-
-void pack_bvh(const BvhTree& tree, DeviceScene& out, std::uint32_t& stack) {
-    WideBvh wide = widen(tree, out.ellipsoids);
-    out.nodes = std::move(wide.nodes);
-    stack = wide.stack_entries;
-    GroupWriter writer(out.ellipsoids, out);
-    writer.resize(wide.groups.size());
-    for (std::size_t g = 0; g < wide.groups.size(); ++g) writer.write(g, wide.groups[g]);
-    if (out.nodes.empty()) {
-        device::BvhNode none{};
-        for (auto& c : none.child) c = BVH_NONE;
-        out.nodes.push_back(none);
-    }
-}
 
 template <class T>
 std::string hash_of(const std::vector<T>& v) {
@@ -234,6 +89,78 @@ MediaTraits pack_media(const Scene& scene, DeviceScene& out) {
     return t;
 }
 
+/// Of the media's bounds as a whole: where `progressive` starts.
+float mean_extinction(const std::vector<Ellipsoid>& ellipsoids) {
+    const Box box = bounds_of(ellipsoids);
+    const glm::dvec3 size = box.hi - box.lo;
+    double mass = 0;
+    for (const Ellipsoid& e : ellipsoids) mass += e.sigma * kernel_mass(e.family, e.extent) / std::abs(e.w[0] * e.w[3] * e.w[5]);
+    return static_cast<float>(std::max(mass / (size.x * size.y * size.z), 1e-20));
+}
+
+/// What the strategies of a program look things up in.
+struct Structures {
+    bool bvh = false;          ///< chords (decomposition, regular, analytic): groups by node
+    bool cell_groups = false;  ///< chords by cell, or densities
+    bool references = false;   ///< null collisions under the cells' bounds
+    bool scene_bound = false;  ///< null collisions under one bound
+    bool chords = false;       ///< something visits chords
+};
+
+Structures structures_of(const DeviceScene& out, bool shadow_rays, const RenderOptions& options) {
+    const std::string &s = out.strategy, &t = out.transmittance;
+    const bool segments = s == "regular" || s == "regular-linear" || s == "march-analytic";
+    const bool null_transmittance = shadow_rays && (t == "ratio" || t == "residual-ratio" || (t == "binary" && s == "delta"));
+    const bool null_collisions = s == "delta" || null_transmittance;
+    const bool chords = segments || s == "decomposition" || (shadow_rays && (t == "analytic" || (t == "binary" && s != "delta")));
+    const bool march = s == "march" || (shadow_rays && t == "march");
+    Structures w;
+    w.chords = chords;
+    w.scene_bound = null_collisions && out.bound == "scene";
+    w.references = null_collisions && !w.scene_bound;
+    // Measured (docs/performance.md): the bvh is ahead for depths everywhere, and for flights where sizes are mixed.
+    w.bvh = segments || options.accelerator == "bvh" || (options.accelerator == "auto" && chords && s != "march");
+    w.cell_groups = w.scene_bound || s == "progressive" || (!w.bvh && (chords || march));
+    return w;
+}
+
+/// Builds what is wanted; says what it is.
+std::string build_structures(const Structures& wanted, std::optional<int> majorant_grid, DeviceScene& out) {
+    const BvhTree tree = build_bvh(out.ellipsoids);
+    std::string text;
+    if (wanted.references || wanted.cell_groups) {
+        const bool densities = wanted.scene_bound || out.strategy == "progressive";
+        const std::size_t n = out.ellipsoids.size();
+        CellOptions o;
+        o.costs.null_share = wanted.references ? 1 : 0;
+        o.costs.density_share = densities ? 1 : 0;
+        o.costs.chord_share = wanted.cell_groups && !densities ? 1 : 0;
+        o.control = wanted.references && out.transmittance == "residual-ratio";
+        o.max_references = std::max<std::size_t>(std::size_t{2} << 20, 8 * n);
+        if (out.bound == "grid" && (wanted.references || densities)) {
+            o.max_levels = 0;
+            o.roots = majorant_grid;
+        }
+        const Cells cells = build_cells(out.ellipsoids, tree, o);
+        pack_cells(cells, wanted.cell_groups, wanted.references, out);
+        text = fmt::format("{}x{}x{} cells, {} octree levels, {} leaves, {:.1f} references per primitive", cells.roots.x, cells.roots.y,
+                           cells.roots.z, cells.levels, cells.leaves.size(), n ? static_cast<double>(cells.references) / static_cast<double>(n) : 0.0);
+    }
+    if (wanted.scene_bound) out.params.scene_bound = std::nextafter(static_cast<float>(std::max(scene_bound(out.ellipsoids, tree), 1e-20)), 1e30f);
+    if (out.strategy == "progressive") out.learned.assign(out.leaves.size(), mean_extinction(out.ellipsoids));
+    if (wanted.bvh) {
+        out.bvh_stack = pack_bvh(tree, out);
+        text += fmt::format("{}8-wide bvh, {} nodes", text.empty() ? "" : "; ", out.nodes.size());
+    }
+    if (!out.group_medium.empty()) text += fmt::format(", {} groups", out.group_medium.size());
+    return text;
+}
+
+/// Place of `name` in the list, counted from 1.
+int index_of(const std::string& name, std::initializer_list<const char*> names) {
+    return 1 + static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
+}
+
 std::string names(device::uint bits, std::initializer_list<const char*> all) {
     std::string s;
     for (const char* name : all) {
@@ -269,7 +196,7 @@ Normalization normalize(const Scene& scene) {
 }
 
 std::uint64_t DeviceScene::byte_size() const {
-    return sizeof(params) + sizeof(device::CellEntry) * cells.size() + sizeof(device::CellLeaf) * leaves.size() + sizeof(device::Reference) * references.size() +
+    return sizeof(params) + sizeof(device::CellEntry) * cells.size() + sizeof(device::CellLeaf) * leaves.size() + sizeof(device::Reference) * references.size() + 8 * learned.size() +
            sizeof(device::Primitive) * primitives.size() + sizeof(device::BvhNode) * nodes.size() +
            4 * groups.size() + 4 * group_medium.size() + sizeof(device::MediumInfo) * media.size() + 16 * shading.size() +
            sizeof(device::LightInfo) * lights.size() + 16 * texels.size() + sizeof(device::AliasEntry) * alias.size();
@@ -289,40 +216,17 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     const LightMasks lights = add_lights(scene, out);
     const RenderSettings& r = scene.render;
 
-    // Measured (docs/design.md): null collisions under the cells' bounds are the fastest unbiased choice on every benchmark scene.
     out.strategy = r.strategy != "auto" ? r.strategy : "delta";
     out.transmittance = r.transmittance != "auto" ? r.transmittance : "analytic";
-    if (out.strategy != "delta" && out.strategy != "decomposition" && out.strategy != "march")
-        throw RenderError(fmt::format("{}: strategy {} is not there yet", scene.path, out.strategy));
-    if (out.transmittance != "analytic") throw RenderError(fmt::format("{}: transmittance {} is not there yet", scene.path, out.transmittance));
+    out.bound = r.bound != "auto" ? r.bound : out.strategy == "progressive" || r.majorant_grid ? "grid" : "tree";
+    const Structures wanted = structures_of(out, lights.nee != 0, options);
 
     const auto start = std::chrono::steady_clock::now();
     out.ellipsoids = make_ellipsoids(scene, out.normalization);
     const Box bounds = bounds_of(out.ellipsoids);
     out.params.bounds_min = pack(bounds.lo);
     out.params.bounds_max = pack(bounds.hi);
-    const BvhTree tree = build_bvh(out.ellipsoids);
-    // Null collisions fly through cells with bounds; everything that sums or inverts chords visits groups, kept by the cells
-    // or by the bvh.
-    const bool delta = out.strategy == "delta", chords = !delta || lights.nee;
-    // Measured (docs/performance.md): the bvh is ahead for depths everywhere, and for flights where sizes are mixed.
-    const bool bvh = options.accelerator == "bvh" || (options.accelerator == "auto" && chords && out.strategy != "march");
-    std::uint32_t stack = 0;
-    std::string accelerator;
-    if (delta || !bvh) {
-        CellCosts costs;
-        costs.null_share = delta ? 1 : 0;
-        costs.chord_share = bvh || !chords ? 0 : 1;
-        const std::size_t n = out.ellipsoids.size();
-        const Cells cells = build_cells(out.ellipsoids, tree, costs, std::max<std::size_t>(std::size_t{2} << 20, 8 * n));
-        pack_cells(cells, chords && !bvh, delta, out);
-        accelerator = fmt::format("{}x{}x{} cells, {} octree levels, {} leaves, {:.1f} references per primitive", cells.roots.x, cells.roots.y,
-                                  cells.roots.z, cells.levels, cells.leaves.size(), n ? static_cast<double>(cells.references) / static_cast<double>(n) : 0.0);
-    }
-    if (bvh) {
-        pack_bvh(tree, out, stack);
-        accelerator += fmt::format("{}8-wide bvh, {} nodes, {} groups", accelerator.empty() ? "" : "; ", out.nodes.size(), out.group_medium.size());
-    }
+    const std::string accelerator = build_structures(wanted, r.majorant_grid, out);
     out.accelerator_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
     const double brightest = std::max(lights.brightest, traits.brightest);
@@ -334,7 +238,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     p.light_count = static_cast<device::uint>(out.lights.size());
     p.max_depth = r.max_depth;
     p.rr_depth = r.rr_depth;
-    if (out.strategy == "march") {
+    if (out.strategy == "march" || out.strategy == "march-analytic" || out.transmittance == "march") {
         double step = r.step.value_or(0);
         if (!r.step) {
             step = out.normalization.radius;
@@ -369,16 +273,20 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     define("CLUME_VISIBLE_BACKGROUND", lights.visible_background);
     define("CLUME_CHANNELS", grey ? 1 : 3);
     define("CLUME_DEPTH_LIMIT", r.max_depth >= 0);
-    define("CLUME_STRATEGY", out.strategy == "delta" ? 2 : out.strategy == "march" ? 3 : 1);
-    define("CLUME_ACCEL", bvh ? 2 : 1);
+    define("CLUME_STRATEGY", index_of(out.strategy, {"decomposition", "delta", "march", "march-analytic", "regular", "regular-linear", "progressive"}));
+    define("CLUME_TRANSMITTANCE", index_of(out.transmittance, {"analytic", "march", "ratio", "residual-ratio", "binary"}));
+    define("CLUME_SCENE_BOUND", out.bound == "scene");
+    if (r.root_finding == "bisection") define("CLUME_BISECTION", 1);
+    define("CLUME_ACCEL", wanted.bvh ? 2 : 1);
     define("CLUME_COUNT", options.count_work);
-    if (bvh) define("CLUME_BVH_STACK", stack);
+    if (wanted.bvh) define("CLUME_BVH_STACK", out.bvh_stack);
     if (!out.cells.empty()) define("CLUME_CELL_LEVELS", out.params.cells_levels);
 
     const auto say = [&](const char* feature, std::string what) { out.explain.emplace_back(feature, std::move(what)); };
     const std::initializer_list<const char*> kinds = {"constant", "envmap", "point", "spot", "directional", "sphere", "rectangle"};
     say("strategy", out.strategy + (r.strategy == "auto" ? " (auto)" : ""));
     say("transmittance", lights.nee ? out.transmittance + (r.transmittance == "auto" ? " (auto)" : "") : "left out: no light needs it");
+    if (wanted.references || wanted.scene_bound || out.strategy == "progressive") say("bound of null collisions", out.bound);
     say("accelerator", accelerator);
     say("kernel families", names(traits.families, {"gaussian", "epanechnikov", "uniform"}));
     say("media", traits.one_medium ? "one kernel and extent, constants of the program" : "looked up per group");

@@ -20,6 +20,7 @@ struct DeviceScene {
     std::vector<device::CellEntry> cells;
     std::vector<device::CellLeaf> leaves;
     std::vector<device::Reference> references;
+    std::vector<float> learned;  ///< first bounds of `progressive`, per leaf
     std::vector<device::Primitive> primitives;
     std::vector<device::BvhNode> nodes;
     std::vector<float> groups;
@@ -32,7 +33,8 @@ struct DeviceScene {
 
     std::vector<std::pair<std::string, std::string>> defines;  ///< of the render program, but CLUME_WIDTH
     std::vector<std::pair<std::string, std::string>> explain;  ///< feature → what the program does about it
-    std::string strategy, transmittance;                       ///< what `auto` became
+    std::string strategy, transmittance, bound;                ///< what `auto` became
+    std::uint32_t bvh_stack = 0;                               ///< entries of a traversal's stack
     std::vector<Ellipsoid> ellipsoids;
     double accelerator_s = 0;                                  ///< seconds to build it
 

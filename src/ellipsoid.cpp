@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "src/parallel.h"
 
@@ -117,6 +118,33 @@ double box_extinction(const Ellipsoid& e, const Box& box) {
         case KernelFamily::uniform: break;
     }
     return e.sigma;
+}
+
+double box_extinction_least(const Ellipsoid& e, const Box& box) {
+    // The distance is convex: it is greatest at a corner.
+    double farthest = 0;
+    for (int k = 0; k < 8; ++k) {
+        const glm::dvec3 corner(k & 1 ? box.hi.x : box.lo.x, k & 2 ? box.hi.y : box.lo.y, k & 4 ? box.hi.z : box.lo.z);
+        farthest = std::max(farthest, glm::length(apply(e.w, corner - e.center)));
+    }
+    const double r = farthest + e.dilation;
+    if (r >= e.extent) return 0;
+    switch (e.family) {
+        case KernelFamily::gaussian: return e.sigma * std::exp(-0.5 * r * r);
+        case KernelFamily::epanechnikov: return e.sigma * (1 - r * r / (e.extent * e.extent));
+        case KernelFamily::uniform: break;
+    }
+    return e.sigma;
+}
+
+double kernel_mass(KernelFamily kernel, double extent) {
+    const double cube = extent * extent * extent;
+    switch (kernel) {
+        case KernelFamily::gaussian: return std::pow(2 * std::numbers::pi, 1.5);
+        case KernelFamily::epanechnikov: return 8 * std::numbers::pi * cube / 15;
+        case KernelFamily::uniform: break;
+    }
+    return 4 * std::numbers::pi * cube / 3;
 }
 
 }  // namespace clume

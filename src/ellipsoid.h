@@ -47,4 +47,10 @@ double box_distance(const Ellipsoid& e, const Box& box);
 /// Upper bound of the primitive's extinction over the box; 0 if its dilated support does not meet the box.
 double box_extinction(const Ellipsoid& e, const Box& box);
 
+/// Lower bound of the primitive's extinction over the box; 0 unless its support holds all of it.
+double box_extinction_least(const Ellipsoid& e, const Box& box);
+
+/// ∫K over space for unit scales, as the file formats' `mass` has it (Gaussians untruncated).
+double kernel_mass(KernelFamily kernel, double extent);
+
 }  // namespace clume

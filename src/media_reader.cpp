@@ -10,6 +10,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <numbers>
 
+#include "src/ellipsoid.h"
 #include "src/error.h"
 #include "src/ply_reader.h"
 
@@ -31,20 +32,6 @@ struct MediumContext {
     bool is_mass = false;
     std::optional<glm::dvec3> albedo, emission;
 };
-
-/// ∫K over space for unit scales [physics.md].
-double kernel_mass(KernelFamily kernel, double extent) {
-    const double cube = extent * extent * extent;
-    switch (kernel) {
-        case KernelFamily::gaussian:
-            return std::pow(2 * pi, 1.5);
-        case KernelFamily::epanechnikov:
-            return 8 * pi * cube / 15;
-        case KernelFamily::uniform:
-            return 4 * pi * cube / 3;
-    }
-    return 0;
-}
 
 /// Depth through the centre of a primitive of unit scale and peak [physics.md].
 double central_depth(KernelFamily kernel, double extent) {

@@ -96,6 +96,8 @@ ProbeRun<ProbeHit> Probe::flights(std::span<const ProbeRay> r, std::uint32_t sam
 ProbeRun<ProbeHit> Probe::transmittances(std::span<const ProbeRay> r) { return rays(r, 0, 2); }
 ProbeRun<ProbeHit> Probe::roulette_transmittances(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 4); }
 
+ProbeRun<ProbeHit> Probe::estimated_transmittances(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 8); }
+
 std::vector<ProbeRay> Probe::camera_rays(std::span<const std::uint32_t> pixels, std::uint32_t sample) {
     Impl& s = *impl_;
     Buffer<device::uint> in(s.queue, pixels);

@@ -82,6 +82,8 @@ public:
     /// Exact transmittances up to t_end.
     ProbeRun<ProbeHit> transmittances(std::span<const ProbeRay> rays);
     /// The renderer's estimates: exact up to a depth, by roulette beyond.
+    /// Transmittances up to t_end by the program's estimator.
+    ProbeRun<ProbeHit> estimated_transmittances(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
     ProbeRun<ProbeHit> roulette_transmittances(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
     /// Camera rays of film pixels (x + width · y), as the renderer's sample `sample` has them.
     std::vector<ProbeRay> camera_rays(std::span<const std::uint32_t> pixels, std::uint32_t sample = 0);

@@ -25,13 +25,15 @@ struct SceneBuffers {
           shading(queue, scene.shading),
           lights(queue, scene.lights),
           texels(queue, scene.texels),
-          alias(queue, scene.alias) {}
+          alias(queue, scene.alias),
+          learned(queue, scene.learned),
+          raised(queue, std::vector<device::uint>(scene.learned.size())) {}
 
-    static constexpr unsigned kArgs = 13;  ///< arguments that `bind` sets
+    static constexpr unsigned kArgs = 15;  ///< arguments that `bind` sets
 
     /// Sets arguments 0 to kArgs − 1.
     void bind(Queue& queue, cl::Kernel& kernel) const {
-        set_args(queue, kernel, 0, params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias);
+        set_args(queue, kernel, 0, params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias, learned, raised);
     }
 
     Buffer<device::RenderParams> params;
@@ -47,6 +49,8 @@ struct SceneBuffers {
     Buffer<device::LightInfo> lights;
     Buffer<device::float4> texels;
     Buffer<device::AliasEntry> alias;
+    Buffer<float> learned;
+    Buffer<device::uint> raised;
 };
 
 }  // namespace clume

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "src/probe.h"
 #include "tests/probe_harness.h"
 #include "tests/reference/analytic_scenes.h"
+#include "tests/reference/statistics.h"
 
 namespace clume::probing {
 
@@ -141,9 +143,10 @@ inline DeviceScene device_scene(Scene scene, const std::string& strategy, const 
 /// that a ray crosses many of them; packed here, by layout.h, apart from the renderer's own packing.
 inline DeviceScene fine_cells(const Scene& scene, double step_cost = 0.5) {
     DeviceScene out = device_scene(scene, "decomposition", "cells");
-    CellCosts costs;
-    costs.step = step_cost;
-    const Cells cells = build_cells(out.ellipsoids, build_bvh(out.ellipsoids), costs, std::size_t{1} << 20);
+    CellOptions options;
+    options.costs.step = step_cost;
+    options.max_references = std::size_t{1} << 20;
+    const Cells cells = build_cells(out.ellipsoids, build_bvh(out.ellipsoids), options);
     out.cells.clear();
     for (const std::uint32_t link : cells.table) out.cells.push_back({link, 0, 0, 0});
     out.leaves.clear();
@@ -215,5 +218,44 @@ inline std::vector<ProbeRay> random_rays(std::size_t count, std::uint64_t seed, 
     }
     return rays;
 }
+
+struct FlightP {
+    double t, winner;
+    double escape_z = 0;  ///< standard deviations by which more escape than should
+};
+
+/// p-values of `count` flights along one ray.
+inline FlightP flight_p(Probe& probe, const std::vector<Ellipsoid>& ellipsoids, const ProbeRay& r, std::size_t count, std::uint32_t sample, bool with_winner = true) {
+    const FlightLaw law(ellipsoids, r, 24);
+    std::map<std::size_t, std::size_t> row;
+    for (std::size_t i = 0; i < law.ids.size(); ++i) row[law.ids[i]] = i;
+    std::vector<double> observed(law.bins + 1), expected;
+    std::vector<double> winners(law.ids.size() * law.bins), winners_expected;
+    const auto n = static_cast<double>(count);
+    for (const ProbeHit& hit : probe.flights(std::vector<ProbeRay>(count, r), sample).values) {
+        if (!hit.collided()) {
+            observed[law.bins] += 1;
+            continue;
+        }
+        const double t = static_cast<double>(hit.t);
+        if (t < law.first * (1 - 1e-5) - 1e-5 || t > law.last * (1 + 1e-5)) return {0, 0};
+        observed[law.bin(t)] += 1;
+        if (!with_winner) continue;
+        const auto at = row.find(hit.primitive);
+        if (at == row.end()) return {1, 0};
+        winners[at->second * law.bins + law.bin(t)] += 1;
+    }
+    for (const double p : law.by_bin) expected.push_back(n * p);
+    for (const auto& line : law.by_primitive)
+        for (const double p : line) winners_expected.push_back(n * p);
+    // Both totals are the collisions; the escape mass closes them.
+    winners.push_back(observed[law.bins]);
+    winners_expected.push_back(expected[law.bins]);
+    const double escape = law.by_bin[law.bins];
+    return {reference::chi_square(observed, expected).p, with_winner ? reference::chi_square(winners, winners_expected).p : 1,
+            (observed[law.bins] - n * escape) / std::sqrt(std::max(n * escape * (1 - escape), 1.0))};
+}
+
+inline const ProbeRay kFlightRays[] = {ray({0.3, -0.2, -3}, {-0.08, 0.07, 1}), ray({0.05, 0.02, -0.03}, {0.3, -0.9, 0.2}), ray({-0.11, 3, 0.06}, {-0.0, -1, 0.0})};
 
 }  // namespace clume::probing

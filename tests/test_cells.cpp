@@ -21,10 +21,11 @@ struct Built {
 };
 
 Cells build(const std::vector<Ellipsoid>& e, bool chords) {
-    CellCosts costs;
-    costs.null_share = chords ? 0 : 1;
-    costs.chord_share = chords ? 1 : 0;
-    return build_cells(e, build_bvh(e), costs, std::max<std::size_t>(std::size_t{2} << 20, 10 * e.size()));
+    CellOptions options;
+    options.costs.null_share = chords ? 0 : 1;
+    options.costs.chord_share = chords ? 1 : 0;
+    options.max_references = std::max<std::size_t>(std::size_t{2} << 20, 10 * e.size());
+    return build_cells(e, build_bvh(e), options);
 }
 
 /// One huge and many tiny primitives.

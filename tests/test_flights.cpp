@@ -23,45 +23,6 @@ struct Strategy {
     const char *name, *accelerator;
 };
 
-struct FlightP {
-    double t, winner;
-    double escape_z = 0;  ///< standard deviations by which more escape than should
-};
-
-/// p-values of `count` flights along one ray.
-FlightP flight_p(Probe& probe, const std::vector<Ellipsoid>& ellipsoids, const ProbeRay& r, std::size_t count, std::uint32_t sample, bool with_winner = true) {
-    const FlightLaw law(ellipsoids, r, 24);
-    std::map<std::size_t, std::size_t> row;
-    for (std::size_t i = 0; i < law.ids.size(); ++i) row[law.ids[i]] = i;
-    std::vector<double> observed(law.bins + 1), expected;
-    std::vector<double> winners(law.ids.size() * law.bins), winners_expected;
-    const auto n = static_cast<double>(count);
-    for (const ProbeHit& hit : probe.flights(std::vector<ProbeRay>(count, r), sample).values) {
-        if (!hit.collided()) {
-            observed[law.bins] += 1;
-            continue;
-        }
-        const double t = static_cast<double>(hit.t);
-        if (t < law.first * (1 - 1e-5) - 1e-5 || t > law.last * (1 + 1e-5)) return {0, 0};
-        observed[law.bin(t)] += 1;
-        if (!with_winner) continue;
-        const auto at = row.find(hit.primitive);
-        if (at == row.end()) return {1, 0};
-        winners[at->second * law.bins + law.bin(t)] += 1;
-    }
-    for (const double p : law.by_bin) expected.push_back(n * p);
-    for (const auto& line : law.by_primitive)
-        for (const double p : line) winners_expected.push_back(n * p);
-    // Both totals are the collisions; the escape mass closes them.
-    winners.push_back(observed[law.bins]);
-    winners_expected.push_back(expected[law.bins]);
-    const double escape = law.by_bin[law.bins];
-    return {chi_square(observed, expected).p, with_winner ? chi_square(winners, winners_expected).p : 1,
-            (observed[law.bins] - n * escape) / std::sqrt(std::max(n * escape * (1 - escape), 1.0))};
-}
-
-const ProbeRay kRays[] = {ray({0.3, -0.2, -3}, {-0.08, 0.07, 1}), ray({0.05, 0.02, -0.03}, {0.3, -0.9, 0.2}), ray({-0.11, 3, 0.06}, {-0.0, -1, 0.0})};
-
 }  // namespace
 
 TEST_CASE("Flights.FollowTheMixture", "[kernels]") {
@@ -82,10 +43,10 @@ TEST_CASE("Flights.FollowTheMixture", "[kernels]") {
                 const DeviceScene scene = delta ? device_scene(mixture, s.name, s.accelerator) : decomposition_scene(mixture, s.accelerator);
                 Probe probe(test_device(), scene);
                 std::uint32_t sample = 0;
-                for (const ProbeRay& r : kRays)
+                for (const ProbeRay& r : kFlightRays)
                     results.push_back({fmt::format("{} of {}, {} on {}, ray {}", n, name, s.name, s.accelerator, sample), flight_p(probe, scene.ellipsoids, r, 80000, sample++)});
                 auto& [sum, count] = escape[fmt::format("{}, {} on {}", name, s.name, s.accelerator)];
-                for (std::size_t i = results.size() - std::size(kRays); i < results.size(); ++i) sum += results[i].p.escape_z, count += 1;
+                for (std::size_t i = results.size() - std::size(kFlightRays); i < results.size(); ++i) sum += results[i].p.escape_z, count += 1;
             }
     const double threshold = reference::sidak_threshold(1e-4, 2 * results.size());
     double least = 1;
@@ -115,7 +76,7 @@ TEST_CASE("Flights.ThroughManySmallPrimitives", "[kernels]") {
             leaves = std::max(leaves, scene.leaves.size());
             Probe probe(test_device(), scene);
             std::uint32_t sample = 0;
-            for (const ProbeRay& r : kRays) {
+            for (const ProbeRay& r : kFlightRays) {
                 const FlightP both = flight_p(probe, scene.ellipsoids, r, 40000, sample++);
                 INFO(s.name << " on " << s.accelerator << ", ray " << sample << ": " << both.t << " " << both.winner);
                 p.insert(p.end(), {both.t, both.winner});
@@ -131,7 +92,7 @@ TEST_CASE("Flights.OneGaussian", "[kernels][quick]") {
     for (const Strategy& s : {Strategy{"decomposition", "cells"}, {"delta", "auto"}}) {
         const DeviceScene scene = device_scene(overlapping_mixture({kGaussian}, 2, 3), s.name, s.accelerator);
         Probe probe(test_device(), scene);
-        const FlightP p = flight_p(probe, scene.ellipsoids, kRays[0], 40000, 0);
+        const FlightP p = flight_p(probe, scene.ellipsoids, kFlightRays[0], 40000, 0);
         CHECK(p.t > 1e-5);
         CHECK(p.winner > 1e-5);
     }
@@ -144,7 +105,7 @@ TEST_CASE("Flights.MarchIsBiasedByItsStep", "[kernels]") {
         scene.render.step = step;
         const DeviceScene marched = device_scene(scene, "march", "cells");
         Probe probe(test_device(), marched);
-        p.push_back(flight_p(probe, marched.ellipsoids, kRays[0], 40000, 5, false).t);
+        p.push_back(flight_p(probe, marched.ellipsoids, kFlightRays[0], 40000, 5, false).t);
     }
     INFO("p " << p[0] << " with a coarse step, " << p[1] << " with a fine one");
     CHECK(p[0] < 1e-9);
@@ -190,13 +151,13 @@ TEST_CASE("Flights.IdenticalPrimitivesShareTheirDensity", "[kernels]") {
         for (const Strategy& s : {Strategy{"decomposition", "cells"}, {"delta", "auto"}}) {
             const DeviceScene scene = device_scene(many, s.name, s.accelerator), single = device_scene(one, s.name, s.accelerator);
             Probe probe(test_device(), scene);
-            const auto hits = probe.flights(std::vector<ProbeRay>(40000, kRays[1])).values;
+            const auto hits = probe.flights(std::vector<ProbeRay>(40000, kFlightRays[1])).values;
             std::vector<double> wins(m);
             for (const auto& h : hits)
                 if (h.collided()) wins[h.primitive] += 1;
             const double total = std::accumulate(wins.begin(), wins.end(), 0.0);
             CHECK(chi_square(wins, std::vector<double>(m, total / m)).p > 1e-6);
-            CHECK(flight_p(probe, single.ellipsoids, kRays[1], 40000, 1, false).t > 1e-6);
+            CHECK(flight_p(probe, single.ellipsoids, kFlightRays[1], 40000, 1, false).t > 1e-6);
         }
     }
 }
@@ -209,9 +170,9 @@ TEST_CASE("Flights.OrderOfPrimitivesIsNoise", "[kernels]") {
             if (turn == 1)
                 for (auto& m : scene.media) std::reverse(m.primitives.begin(), m.primitives.end());
             const DeviceScene packed = device_scene(scene, s.name, s.accelerator);
-            const FlightLaw law(packed.ellipsoids, kRays[0], 24);
+            const FlightLaw law(packed.ellipsoids, kFlightRays[0], 24);
             histogram[turn].assign(law.bins + 1, 0);
-            for (const auto& h : Probe(test_device(), packed).flights(std::vector<ProbeRay>(40000, kRays[0]), static_cast<std::uint32_t>(turn)).values)
+            for (const auto& h : Probe(test_device(), packed).flights(std::vector<ProbeRay>(40000, kFlightRays[0]), static_cast<std::uint32_t>(turn)).values)
                 histogram[turn][h.collided() ? law.bin(static_cast<double>(h.t)) : law.bins] += 1;
         }
         CHECK(reference::chi_square_two(histogram[0], histogram[1]).p > 1e-5);

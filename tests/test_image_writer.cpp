@@ -40,7 +40,7 @@ RenderImage noise_image(CropWindow window, int film_width, int film_height) {
     std::mt19937 rng(7);
     std::uniform_real_distribution<float> uniform(0, 4);
     const auto count = static_cast<std::size_t>(window.x1 - window.x0) * static_cast<std::size_t>(window.y1 - window.y0);
-    RenderImage image{film_width, film_height, window, {}, {}, {}, {}};
+    RenderImage image{film_width, film_height, window, {}, {}, {}, {}, {}};
     for (std::size_t i = 0; i < count; ++i) {
         for (int c = 0; c < 3; ++c) {
             image.rgb.push_back(uniform(rng) * 1e3f);

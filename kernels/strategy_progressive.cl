@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// `progressive`: null collisions under bounds that start low and are learned [Misso23, Progressive null-tracking for
+// volumetric rendering, SIGGRAPH 2023]. A density above its cell's bound raises it for the next pass (atomically; the bounds
+// of a pass are frozen, so that runs repeat) and is clamped to it in this one: consistent, not unbiased. What was clamped is
+// counted. Cells that no primitive meets are known to be empty; no other starts at 0.
+#include "strategy_delta.cl"
+
+/// The density sigma was found in a cell whose bound in this pass is `bound`: returns it clamped, reports and raises.
+static float progressive_clamp(float sigma, float bound, __global uint* raised, Flight* f) {
+    if (!(sigma > bound)) return sigma;
+    atomic_max(raised, as_uint(sigma));  // bits of positive floats are ordered as they are
+    f->violations += 1;
+    f->excess += (ulong)(divide_s(sigma - bound, sigma) * 0x1p20f);
+    return bound;
+}
+
+static int flight_progressive(float3 o, float3 d, float t_end, Flight* f, const Draws* r, SCENE_ARGS) {
+    CellWalk w;
+    if (!cells_enter(&w, o, d, f->t, t_end, params, cells)) return FLIGHT_ESCAPED;
+    uint draw = f->draw;
+    const uint pause = draw + CLUME_FLIGHT_DRAWS;
+    uint4 bits = draw_bits(r, draw);
+    float tau = exponential_s(bits.x);
+    do {
+        COUNT(&f->work, WORK_CELLS, 1);
+        if (w.entry.link < CELL_EMPTY_MAX) continue;
+        const uint index = w.entry.link - CELL_EMPTY_MAX;
+        const CellLeaf leaf = leaves[index];
+        const float bound = learned[index], end = min_s(w.t_exit, w.t_end);
+        float t = w.t;
+        for (;;) {
+            const float depth = bound * (end - t);
+            if (!(tau < depth)) {
+                tau -= depth;
+                break;
+            }
+            t = min_s(fma(tau, rcp_s(bound), t), end);
+            const float3 p = along_s(o, d, t);
+            const float density = groups_density(leaf.first_group, leaf.group_count, p, SCENE);
+            COUNT(&f->work, WORK_GROUPS, leaf.group_count);
+            COUNT(&f->work, WORK_DENSITIES, 1);
+            COUNT(&f->work, WORK_DRAWS, 1);
+            const float sigma = progressive_clamp(density, bound, raised + index, f);
+            draw += 1;
+            if (uniform_s(bits.y) * bound < sigma) {
+#if CLUME_PER_PRIMITIVE
+                f->primitive = groups_pick(leaf.first_group, leaf.group_count, p, uniform_s(bits.z) * density, SCENE);
+#endif
+                f->t = t;
+                return FLIGHT_COLLIDED;
+            }
+            if (draw == pause) {
+                f->t = t;
+                f->draw = draw;
+                return FLIGHT_PAUSED;
+            }
+            bits = draw_bits(r, draw);
+            tau = exponential_s(bits.x);
+        }
+    } while (cells_next(&w, CLUME_CELL_LEVELS, cells));
+    return FLIGHT_ESCAPED;
+}
