@@ -41,10 +41,11 @@ glm::dvec3 background(const Scene& scene) {
     return sum;
 }
 
-RenderImage develop(const Scene& scene, const CropWindow& w, const std::vector<device::uint>& pixels, const FilmSums& film, std::uint32_t samples, bool count_work) {
+/// `b`: what inactive pixels hold.
+RenderImage develop(const Film& size, const glm::dvec3& b, const CropWindow& w, const std::vector<device::uint>& pixels, const FilmSums& film, std::uint32_t samples, bool count_work) {
     RenderImage image;
-    image.film_width = scene.film.width;
-    image.film_height = scene.film.height;
+    image.film_width = size.width;
+    image.film_height = size.height;
     image.window = w;
     const auto width = static_cast<std::size_t>(w.x1 - w.x0), count = width * static_cast<std::size_t>(w.y1 - w.y0);
     image.rgb.resize(3 * count);
@@ -52,11 +53,10 @@ RenderImage develop(const Scene& scene, const CropWindow& w, const std::vector<d
     image.variance.assign(3 * count, 0);
     image.samples.assign(count, samples);
     if (count_work) image.tests.assign(count, 0);
-    const glm::dvec3 b = background(scene);
     for (std::size_t i = 0; i < count; ++i)
         for (int c = 0; c < 3; ++c) image.rgb[3 * i + static_cast<std::size_t>(c)] = static_cast<float>(b[c]);
     for (std::size_t k = 0; k < pixels.size(); ++k) {
-        const auto x = static_cast<int>(pixels[k] % static_cast<device::uint>(scene.film.width)), y = static_cast<int>(pixels[k] / static_cast<device::uint>(scene.film.width));
+        const auto x = static_cast<int>(pixels[k] % static_cast<device::uint>(size.width)), y = static_cast<int>(pixels[k] / static_cast<device::uint>(size.width));
         const std::size_t i = static_cast<std::size_t>(x - w.x0) + width * static_cast<std::size_t>(y - w.y0);
         const FilmSums::Pixel p = film.pixel(k);
         for (std::size_t c = 0; c < 3; ++c) {
@@ -104,7 +104,8 @@ double Accumulation::render_s() const { return state_->render_s; }
 bool Accumulation::complete() const { return !(state_->interrupted || state_->time_limited || state_->device_lost); }
 
 struct Renderer::Impl {
-    Scene scene;
+    Film film;
+    glm::dvec3 background{0};
     RenderOptions options;
     CropWindow window;
     RenderStats setup;
@@ -112,7 +113,6 @@ struct Renderer::Impl {
     std::vector<Tile> tiles;
     int channels = 3;
     double film_scale = 1;
-    bool samples_lights = false;
     std::vector<std::unique_ptr<Worker>> workers;  ///< DeviceRenderers; a device that fails is dropped for good
 
     std::uint64_t all_pixels() const {
@@ -176,8 +176,9 @@ void Renderer::Impl::run_pass(Accumulation::State& a, std::uint32_t begin, std::
     a.time_limited = a.time_limited || (report.stopped && !stop_asked());
 }
 
-Renderer::Renderer(Scene scene, RenderOptions options) : impl_(std::make_unique<Impl>()) {
-    impl_->scene = std::move(scene);
+Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_unique<Impl>()) {
+    impl_->film = scene.film;
+    impl_->background = background(scene);
     impl_->options = std::move(options);
     const RenderOptions& o = impl_->options;
     std::vector<DeviceInfo> devices = select_devices(o.devices);
@@ -189,9 +190,9 @@ Renderer::Renderer(Scene scene, RenderOptions options) : impl_(std::make_unique<
         }
         devices = std::move(split);
     }
-    impl_->window = o.crop.value_or(CropWindow{0, 0, impl_->scene.film.width, impl_->scene.film.height});
+    impl_->window = o.crop.value_or(CropWindow{0, 0, scene.film.width, scene.film.height});
 
-    const DeviceScene device = make_device_scene(impl_->scene, o);
+    const DeviceScene device = make_device_scene(scene, o);
     RenderStats& stats = impl_->setup;
     stats.strategy = device.strategy;
     stats.transmittance = device.transmittance;
@@ -200,16 +201,13 @@ Renderer::Renderer(Scene scene, RenderOptions options) : impl_(std::make_unique<
     stats.layout_hash = device.hash();
     stats.explain = device.explain;
     stats.build_s = device.accelerator_s;
-    check_memory(impl_->scene, device, devices);
+    check_memory(scene, device, devices);
 
-    impl_->pixels = active_pixels(impl_->scene, device, impl_->window);
+    impl_->pixels = active_pixels(scene, device, impl_->window);
     impl_->tiles = make_tiles(impl_->pixels.size(), devices);
     stats.empty_pixels = impl_->all_pixels() - impl_->pixels.size();
-    const auto is = [&](const char* name, const char* value) {
-        return std::find(device.defines.begin(), device.defines.end(), std::pair<std::string, std::string>(name, value)) != device.defines.end();
-    };
-    impl_->channels = is("CLUME_CHANNELS", "1") ? 1 : 3;
-    impl_->samples_lights = !is("CLUME_NEE", "0");
+    const bool grey = std::find(device.defines.begin(), device.defines.end(), std::pair<std::string, std::string>("CLUME_CHANNELS", "1")) != device.defines.end();
+    impl_->channels = grey ? 1 : 3;
     impl_->film_scale = static_cast<double>(device.params.film_scale);
     impl_->make_workers(devices, device);
 }
@@ -217,9 +215,7 @@ Renderer::Renderer(Scene scene, RenderOptions options) : impl_(std::make_unique<
 Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
-const Scene& Renderer::scene() const { return impl_->scene; }
 const RenderStats& Renderer::setup() const { return impl_->setup; }
-bool Renderer::samples_lights() const { return impl_->samples_lights; }
 
 Accumulation Renderer::start(std::uint64_t seed, std::uint32_t begin) const {
     return Accumulation(std::unique_ptr<Accumulation::State>(
@@ -261,7 +257,7 @@ RenderResult Renderer::result(const Accumulation& accumulation) const {
     stats.bound_violations = a.film.violations();
     if (stats.bound_violations > 0)
         stats.warnings.push_back(fmt::format("the density exceeded its bound {} times: please report this scene", stats.bound_violations));
-    result.image = develop(impl_->scene, impl_->window, impl_->pixels, a.film, empty_samples, impl_->options.count_work);
+    result.image = develop(impl_->film, impl_->background, impl_->window, impl_->pixels, a.film, empty_samples, impl_->options.count_work);
     return result;
 }
 

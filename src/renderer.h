@@ -121,8 +121,9 @@ private:
 /// sample ranges; nothing is built again. render.seed and render.spp are not used. One thread at a time.
 class Renderer {
 public:
-    /// Throws RenderError, SceneError (a film too large), DeviceError (runtime/error.h; no device, none passes).
-    Renderer(Scene scene, RenderOptions options);
+    /// Keeps no reference to `scene`. Throws RenderError, SceneError (a film too large), DeviceError (runtime/error.h; no
+    /// device, none passes).
+    Renderer(const Scene& scene, RenderOptions options);
     ~Renderer();
     Renderer(Renderer&&) noexcept;
     Renderer& operator=(Renderer&&) noexcept;
@@ -135,11 +136,8 @@ public:
     /// Means, variances and statistics of what the film holds now.
     RenderResult result(const Accumulation& accumulation) const;
 
-    const Scene& scene() const;
     /// What is known before the first path: names that `auto` became, build and compile times, sizes, explanation.
     const RenderStats& setup() const;
-    /// Whether lights are sampled directly, so that the transmittance estimator makes a difference.
-    bool samples_lights() const;
 
 private:
     struct Impl;
