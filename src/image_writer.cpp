@@ -16,6 +16,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <string_view>
 
 #include "src/error.h"
 
@@ -109,7 +110,7 @@ void write_exr(const std::filesystem::path& path, const RenderImage& image, cons
     file.commit();
 }
 
-RenderImage read_exr(const std::filesystem::path& path, ImageMetadata* metadata) {
+RenderImage read_exr(const std::filesystem::path& path, ImageMetadata* metadata, bool colour_suffices) {
     try {
         Imf::InputFile exr(path.c_str());
         const Imf::Header& header = exr.header();
@@ -126,7 +127,8 @@ RenderImage read_exr(const std::filesystem::path& path, ImageMetadata* metadata)
         image.samples.resize(count);
         const Imf::FrameBuffer buffer = frame_buffer(image, data);
         for (auto slice = buffer.begin(); slice != buffer.end(); ++slice)
-            if (header.channels().findChannel(slice.name()) == nullptr)
+            if (header.channels().findChannel(slice.name()) == nullptr &&
+                (!colour_suffices || std::find(colour_names.begin(), colour_names.end(), std::string_view(slice.name())) != colour_names.end()))
                 throw RenderError(std::string("it has no channel ") + slice.name());
         exr.setFrameBuffer(buffer);
         exr.readPixels(data.min.y, data.max.y);

@@ -33,7 +33,6 @@ TEST_CASE("Renderer.PartsOfInterleavedSeedsAddUpToSingleRuns", "[quick]") {
     RenderOptions options;
     options.count_work = true;
     Renderer renderer(scene, options);
-    CHECK(renderer.samples_lights());
     Accumulation a = renderer.start(5), b = renderer.start(6), late = renderer.start(5, 4);
     for (const std::uint32_t end : {1u, 2u, 4u, 9u}) {
         renderer.extend(a, end);
