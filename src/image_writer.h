@@ -3,6 +3,7 @@
 // All functions throw RenderError with the file and the reason.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -26,5 +27,8 @@ RenderImage read_exr(const std::filesystem::path& path, ImageMetadata* metadata 
 /// 8-bit opaque RGB, sRGB, of the crop window: the image over black, which premultiplied colour already is, times 2^exposure,
 /// clipped to 0..1.
 void write_png(const std::filesystem::path& path, const RenderImage& image, double exposure_stops = 0);
+
+/// Linear to 8-bit sRGB (IEC 61966-2-1), clipped; NaN becomes 0.
+std::uint8_t encode_srgb(double linear);
 
 }  // namespace clume

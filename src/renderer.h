@@ -82,6 +82,7 @@ struct Progress {
     std::uint64_t paths_done = 0, paths_total = 0;
     double elapsed_s = 0;
     double mpaths_s = 0;
+    std::string what = {};  ///< part of a longer job
 };
 
 struct RenderResult {
