@@ -154,4 +154,10 @@ LightMasks add_lights(const Scene& scene, DeviceScene& out) {
     return masks;
 }
 
+bool samples_lights(const Scene& scene) {
+    DeviceScene scratch;
+    scratch.normalization = normalize(scene);
+    return add_lights(scene, scratch).nee != 0;
+}
+
 }  // namespace clume

@@ -16,4 +16,7 @@ struct LightMasks {
 
 LightMasks add_lights(const Scene& scene, DeviceScene& out);
 
+/// Whether any light is sampled directly (next-event estimation): else no transmittance is ever estimated.
+bool samples_lights(const Scene& scene);
+
 }  // namespace clume

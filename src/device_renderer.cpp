@@ -2,6 +2,7 @@
 #include "src/device_renderer.h"
 
 #include <algorithm>
+#include <cassert>
 
 #include "runtime/program.h"
 
@@ -16,10 +17,10 @@ constexpr unsigned kFirstBatchArg = SceneBuffers::kArgs + 1;  // after the scene
 int vector_width_of(const DeviceInfo& info, int wanted) { return wanted > 0 ? wanted : static_cast<int>(info.native_vector_width); }
 
 DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene, const std::vector<device::uint>& pixels,
-                               const std::vector<Tile>& tiles, int vector_width, FilmSums& film)
+                               const std::vector<Tile>& tiles, int vector_width)
     : queue_(info),
       tiles_(tiles),
-      film_(film),
+      params_(scene.params),
       scene_(queue_, scene),
       pixels_(queue_, pixels),
       unfinished_(queue_, 1),
@@ -38,6 +39,13 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
         set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(0), cl_uint(1), cl_uint(1), cl_uint(0), cl_uint(0), cl_uint(0));
         queue_.launch(kernel_, kLocalSize, kLocalSize);
     }
+}
+
+void DeviceRenderer::aim(FilmSums& film, std::uint64_t seed) {
+    film_ = &film;
+    params_.seed_lo = static_cast<device::uint>(seed);
+    params_.seed_hi = static_cast<device::uint>(seed >> 32);
+    scene_.params.upload(std::span(&params_, 1));
 }
 
 std::size_t DeviceRenderer::render(const Tile& tile, std::uint32_t begin, std::uint32_t end) {
@@ -69,7 +77,8 @@ std::size_t DeviceRenderer::render(const Tile& tile, std::uint32_t begin, std::u
 void DeviceRenderer::run(const Batch& batch) {
     const Tile& tile = tiles_[batch.item];
     const std::size_t splits = render(tile, batch.begin, batch.end);
-    film_.add(tile.first, tile.count, splits, batch.end - batch.begin, host_sums_);
+    assert(film_ != nullptr);
+    film_->add(tile.first, tile.count, splits, batch.end - batch.begin, host_sums_);
 }
 
 }  // namespace clume

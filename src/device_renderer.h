@@ -24,7 +24,10 @@ class DeviceRenderer : public Worker {
 public:
     /// Builds the program (width 0: the device's own), uploads the scene, warms up. Throws DeviceError.
     DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene, const std::vector<device::uint>& pixels, const std::vector<Tile>& tiles,
-                   int vector_width, FilmSums& film);
+                   int vector_width);
+
+    /// Batches from now on use `seed` and add to `film`, which must outlive them. Throws DeviceError.
+    void aim(FilmSums& film, std::uint64_t seed);
 
     std::string name() const override { return queue_.label(); }
     void run(const Batch& batch) override;
@@ -35,7 +38,8 @@ private:
 
     Queue queue_;
     const std::vector<Tile>& tiles_;
-    FilmSums& film_;
+    FilmSums* film_ = nullptr;
+    device::RenderParams params_;
     SceneBuffers scene_;
     Buffer<device::uint> pixels_;
     Buffer<device::PathState> states_;

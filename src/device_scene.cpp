@@ -203,7 +203,9 @@ std::uint64_t DeviceScene::byte_size() const {
 }
 
 std::string DeviceScene::hash() const {
-    std::string all = sha256_hex(std::as_bytes(std::span(&params, 1)));
+    device::RenderParams seedless = params;
+    seedless.seed_lo = seedless.seed_hi = 0;
+    std::string all = sha256_hex(std::as_bytes(std::span(&seedless, 1)));
     all += hash_of(cells) + hash_of(leaves) + hash_of(references) + hash_of(primitives) + hash_of(nodes) + hash_of(groups) + hash_of(group_medium) + hash_of(media);
     all += hash_of(shading) + hash_of(lights) + hash_of(texels) + hash_of(alias);
     return sha256_hex(all);

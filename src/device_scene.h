@@ -39,7 +39,7 @@ struct DeviceScene {
     double accelerator_s = 0;                                  ///< seconds to build it
 
     std::uint64_t byte_size() const;
-    std::string hash() const;  ///< SHA-256 over all buffers
+    std::string hash() const;  ///< SHA-256 over all buffers, the seed left out
 };
 
 /// Throws SceneError for what no strategy can render, RenderError for an impossible combination of options.

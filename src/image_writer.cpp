@@ -16,6 +16,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <string_view>
 
 #include "src/error.h"
 
@@ -71,15 +72,14 @@ std::size_t checked_pixel_count(const std::filesystem::path& path, const RenderI
     return count;
 }
 
-/// Linear to 8-bit sRGB (IEC 61966-2-1); NaN becomes 0.
+}  // namespace
+
 std::uint8_t encode_srgb(double linear) {
     if (!(linear > 0)) return 0;
     if (linear >= 1) return 255;
     const double encoded = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
     return static_cast<std::uint8_t>(encoded * 255 + 0.5);
 }
-
-}  // namespace
 
 void write_exr(const std::filesystem::path& path, const RenderImage& image, const ImageMetadata& metadata) {
     checked_pixel_count(path, image);
@@ -109,7 +109,7 @@ void write_exr(const std::filesystem::path& path, const RenderImage& image, cons
     file.commit();
 }
 
-RenderImage read_exr(const std::filesystem::path& path, ImageMetadata* metadata) {
+RenderImage read_exr(const std::filesystem::path& path, ImageMetadata* metadata, bool colour_suffices) {
     try {
         Imf::InputFile exr(path.c_str());
         const Imf::Header& header = exr.header();
@@ -126,7 +126,8 @@ RenderImage read_exr(const std::filesystem::path& path, ImageMetadata* metadata)
         image.samples.resize(count);
         const Imf::FrameBuffer buffer = frame_buffer(image, data);
         for (auto slice = buffer.begin(); slice != buffer.end(); ++slice)
-            if (header.channels().findChannel(slice.name()) == nullptr)
+            if (header.channels().findChannel(slice.name()) == nullptr &&
+                (!colour_suffices || std::find(colour_names.begin(), colour_names.end(), std::string_view(slice.name())) != colour_names.end()))
                 throw RenderError(std::string("it has no channel ") + slice.name());
         exr.setFrameBuffer(buffer);
         exr.readPixels(data.min.y, data.max.y);

@@ -41,10 +41,11 @@ glm::dvec3 background(const Scene& scene) {
     return sum;
 }
 
-RenderImage develop(const Scene& scene, const CropWindow& w, const std::vector<device::uint>& pixels, const FilmSums& film, std::uint32_t samples, bool count_work) {
+/// `b`: what inactive pixels hold.
+RenderImage develop(const Film& size, const glm::dvec3& b, const CropWindow& w, const std::vector<device::uint>& pixels, const FilmSums& film, std::uint32_t samples, bool count_work) {
     RenderImage image;
-    image.film_width = scene.film.width;
-    image.film_height = scene.film.height;
+    image.film_width = size.width;
+    image.film_height = size.height;
     image.window = w;
     const auto width = static_cast<std::size_t>(w.x1 - w.x0), count = width * static_cast<std::size_t>(w.y1 - w.y0);
     image.rgb.resize(3 * count);
@@ -52,11 +53,10 @@ RenderImage develop(const Scene& scene, const CropWindow& w, const std::vector<d
     image.variance.assign(3 * count, 0);
     image.samples.assign(count, samples);
     if (count_work) image.tests.assign(count, 0);
-    const glm::dvec3 b = background(scene);
     for (std::size_t i = 0; i < count; ++i)
         for (int c = 0; c < 3; ++c) image.rgb[3 * i + static_cast<std::size_t>(c)] = static_cast<float>(b[c]);
     for (std::size_t k = 0; k < pixels.size(); ++k) {
-        const auto x = static_cast<int>(pixels[k] % static_cast<device::uint>(scene.film.width)), y = static_cast<int>(pixels[k] / static_cast<device::uint>(scene.film.width));
+        const auto x = static_cast<int>(pixels[k] % static_cast<device::uint>(size.width)), y = static_cast<int>(pixels[k] / static_cast<device::uint>(size.width));
         const std::size_t i = static_cast<std::size_t>(x - w.x0) + width * static_cast<std::size_t>(y - w.y0);
         const FilmSums::Pixel p = film.pixel(k);
         for (std::size_t c = 0; c < 3; ++c) {
@@ -84,23 +84,116 @@ std::vector<std::pair<std::string, std::string>> explain(const Scene& scene, con
     return make_device_scene(scene, options).explain;
 }
 
-RenderResult render(const Scene& scene, const RenderOptions& options, const std::function<void(const Progress&)>& progress,
-                    const std::atomic<bool>& stop) {
-    RenderResult result;
-    RenderStats& stats = result.stats;
-    std::vector<DeviceInfo> devices = select_devices(options.devices);
-    if (options.cpu_split > 1) {
+struct Accumulation::State {
+    std::uint64_t seed;
+    std::uint32_t begin, end;
+    FilmSums film;
+    std::vector<DeviceShare> devices;
+    double render_s = 0, cpu_s = 0;
+    bool interrupted = false, time_limited = false, device_lost = false;
+};
+
+Accumulation::Accumulation(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Accumulation::~Accumulation() = default;
+Accumulation::Accumulation(Accumulation&&) noexcept = default;
+Accumulation& Accumulation::operator=(Accumulation&&) noexcept = default;
+std::uint64_t Accumulation::seed() const { return state_->seed; }
+std::uint32_t Accumulation::begin() const { return state_->begin; }
+std::uint32_t Accumulation::end() const { return state_->end; }
+double Accumulation::render_s() const { return state_->render_s; }
+bool Accumulation::complete() const { return !(state_->interrupted || state_->time_limited || state_->device_lost); }
+
+struct Renderer::Impl {
+    Film film;
+    glm::dvec3 background{0};
+    RenderOptions options;
+    CropWindow window;
+    RenderStats setup;
+    std::vector<device::uint> pixels;
+    std::vector<Tile> tiles;
+    int channels = 3;
+    double film_scale = 1;
+    std::vector<std::unique_ptr<Worker>> workers;  ///< DeviceRenderers; a device that fails is dropped for good
+
+    std::uint64_t all_pixels() const {
+        return static_cast<std::uint64_t>(window.x1 - window.x0) * static_cast<std::uint64_t>(window.y1 - window.y0);
+    }
+    void make_workers(const std::vector<DeviceInfo>& devices, const DeviceScene& device);
+    /// Samples [begin, end) of every tile, by all devices.
+    void run_pass(Accumulation::State& a, std::uint32_t begin, std::uint32_t end, const RunControl& control);
+};
+
+void Renderer::Impl::make_workers(const std::vector<DeviceInfo>& devices, const DeviceScene& device) {
+    const auto start = Clock::now();
+    for (const auto& d : devices) {
+        try {
+            const SelfTestResult test = self_test(d, options.vector_width);
+            if (!test.error.empty()) throw DeviceError(fmt::format("{} fails its self-test: {}", d.label(), test.error));
+            if (!test.outside_exact_set.empty())
+                setup.warnings.push_back(fmt::format("{} is outside the bit-exact set: {}", d.label(), test.outside_exact_set));
+            workers.push_back(std::make_unique<DeviceRenderer>(d, device, pixels, tiles, options.vector_width));
+        } catch (const DeviceError& e) {
+            if (devices.size() == 1) throw;
+            setup.warnings.push_back(fmt::format("device left out: {}", e.what()));
+        }
+    }
+    if (workers.empty()) throw DeviceError("no device is left:\n  " + fmt::format("{}", fmt::join(setup.warnings, "\n  ")));
+    setup.compile_s = seconds_since(start);
+}
+
+void Renderer::Impl::run_pass(Accumulation::State& a, std::uint32_t begin, std::uint32_t end, const RunControl& control) {
+    for (const auto& w : workers) static_cast<DeviceRenderer&>(*w).aim(a.film, a.seed);
+    const auto start = Clock::now();
+    const std::clock_t cpu_start = std::clock();
+    const auto stop_asked = [&] { return control.stop && control.stop->load(); };
+    DispatchOptions o;
+    o.items = static_cast<std::uint32_t>(tiles.size());
+    o.begin = begin;
+    o.end = end;
+    o.fixed_chunk = options.batch_samples;
+    o.stop = [&] { return stop_asked() || (control.time_limit_s && seconds_since(start) >= *control.time_limit_s); };
+    o.progress = [&](const DispatchProgress& p) {
+        const double share = static_cast<double>(p.units_done) / static_cast<double>(std::max<std::uint64_t>(1, p.units_total));
+        const auto total = all_pixels() * (end - begin);
+        const auto done = static_cast<std::uint64_t>(share * static_cast<double>(total));
+        if (control.progress) control.progress({done, total, p.elapsed_s, p.elapsed_s > 0 ? static_cast<double>(done) / p.elapsed_s / 1e6 : 0});
+    };
+    const DispatchReport report = dispatch(workers, o);
+    a.render_s += seconds_since(start);
+    a.cpu_s += static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
+    setup.warnings.insert(setup.warnings.end(), report.warnings.begin(), report.warnings.end());
+    for (std::size_t k = report.workers.size(); k-- > 0;) {
+        const WorkerReport& w = report.workers[k];
+        const auto share = std::find_if(a.devices.begin(), a.devices.end(), [&](const DeviceShare& d) { return d.name == w.name; });
+        if (share != a.devices.end()) share->busy_s += w.busy_s;
+        else a.devices.insert(a.devices.begin(), DeviceShare{w.name, 0, w.busy_s});
+        if (w.dropped) workers.erase(workers.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+    if (report.failed && report.units_done == 0 && begin == a.begin)
+        throw DeviceError("every device failed:\n  " + fmt::format("{}", fmt::join(report.warnings, "\n  ")));
+    a.device_lost = a.device_lost || report.failed;
+    a.interrupted = a.interrupted || (report.stopped && stop_asked());
+    a.time_limited = a.time_limited || (report.stopped && !stop_asked());
+}
+
+Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_unique<Impl>()) {
+    impl_->film = scene.film;
+    impl_->background = background(scene);
+    impl_->options = std::move(options);
+    const RenderOptions& o = impl_->options;
+    std::vector<DeviceInfo> devices = select_devices(o.devices);
+    if (o.cpu_split > 1) {
         std::vector<DeviceInfo> split;
         for (const auto& d : devices) {
             if (d.type != "cpu") split.push_back(d);
-            else for (auto& part : split_cpu(d, options.cpu_split)) split.push_back(std::move(part));
+            else for (auto& part : split_cpu(d, o.cpu_split)) split.push_back(std::move(part));
         }
         devices = std::move(split);
     }
-    const CropWindow window = options.crop.value_or(CropWindow{0, 0, scene.film.width, scene.film.height});
-    const std::uint32_t begin = options.sample_begin, end = options.sample_end ? options.sample_end : scene.render.spp;
+    impl_->window = o.crop.value_or(CropWindow{0, 0, scene.film.width, scene.film.height});
 
-    const DeviceScene device = make_device_scene(scene, options);
+    const DeviceScene device = make_device_scene(scene, o);
+    RenderStats& stats = impl_->setup;
     stats.strategy = device.strategy;
     stats.transmittance = device.transmittance;
     stats.primitives = device.ellipsoids.size();
@@ -110,75 +203,70 @@ RenderResult render(const Scene& scene, const RenderOptions& options, const std:
     stats.build_s = device.accelerator_s;
     check_memory(scene, device, devices);
 
-    const std::vector<device::uint> pixels = active_pixels(scene, device, window);
-    const std::vector<Tile> tiles = make_tiles(pixels.size(), devices);
-    const auto all_pixels = static_cast<std::uint64_t>(window.x1 - window.x0) * static_cast<std::uint64_t>(window.y1 - window.y0);
-    stats.empty_pixels = all_pixels - pixels.size();
+    impl_->pixels = active_pixels(scene, device, impl_->window);
+    impl_->tiles = make_tiles(impl_->pixels.size(), devices);
+    stats.empty_pixels = impl_->all_pixels() - impl_->pixels.size();
     const bool grey = std::find(device.defines.begin(), device.defines.end(), std::pair<std::string, std::string>("CLUME_CHANNELS", "1")) != device.defines.end();
-    FilmSums film(pixels.size(), grey ? 1 : 3, static_cast<double>(device.params.film_scale));
+    impl_->channels = grey ? 1 : 3;
+    impl_->film_scale = static_cast<double>(device.params.film_scale);
+    impl_->make_workers(devices, device);
+}
 
-    const auto compile_start = Clock::now();
-    std::vector<std::unique_ptr<Worker>> workers;
-    for (const auto& d : devices) {
-        try {
-            const SelfTestResult test = self_test(d, options.vector_width);
-            if (!test.error.empty()) throw DeviceError(fmt::format("{} fails its self-test: {}", d.label(), test.error));
-            if (!test.outside_exact_set.empty())
-                stats.warnings.push_back(fmt::format("{} is outside the bit-exact set: {}", d.label(), test.outside_exact_set));
-            workers.push_back(std::make_unique<DeviceRenderer>(d, device, pixels, tiles, options.vector_width, film));
-        } catch (const DeviceError& e) {
-            if (devices.size() == 1) throw;
-            stats.warnings.push_back(fmt::format("device left out: {}", e.what()));
-        }
-    }
-    if (workers.empty()) throw DeviceError("no device is left:\n  " + fmt::format("{}", fmt::join(stats.warnings, "\n  ")));
-    stats.compile_s = seconds_since(compile_start);
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+const RenderStats& Renderer::setup() const { return impl_->setup; }
 
-    const auto start = Clock::now();
-    const std::clock_t cpu_start = std::clock();
-    std::uint32_t empty_samples = end - begin;
-    if (!tiles.empty() && end > begin) {
-        DispatchOptions o;
-        o.items = static_cast<std::uint32_t>(tiles.size());
-        o.begin = begin;
-        o.end = end;
-        o.fixed_chunk = options.batch_samples;
-        o.stop = [&] { return stop.load() || (options.time_limit_s && seconds_since(start) >= *options.time_limit_s); };
-        o.progress = [&](const DispatchProgress& p) {
-            const double share = static_cast<double>(p.units_done) / static_cast<double>(std::max<std::uint64_t>(1, p.units_total));
-            const auto total = all_pixels * (end - begin);
-            const auto done = static_cast<std::uint64_t>(share * static_cast<double>(total));
-            if (progress) progress({done, total, p.elapsed_s, p.elapsed_s > 0 ? static_cast<double>(done) / p.elapsed_s / 1e6 : 0});
-        };
-        const DispatchReport report = dispatch(workers, o);
-        stats.warnings.insert(stats.warnings.end(), report.warnings.begin(), report.warnings.end());
-        for (const auto& w : report.workers) stats.devices.push_back({w.name, 0, w.busy_s});
-        if (report.failed && report.units_done == 0) throw DeviceError("every device failed:\n  " + fmt::format("{}", fmt::join(report.warnings, "\n  ")));
-        stats.device_lost = report.failed;
-        stats.interrupted = report.stopped && stop.load();
-        stats.time_limited = report.stopped && !stop.load();
-    }
-    stats.render_s = seconds_since(start);
-    stats.cpu_s = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
+Accumulation Renderer::start(std::uint64_t seed, std::uint32_t begin) const {
+    return Accumulation(std::unique_ptr<Accumulation::State>(
+        new Accumulation::State{seed, begin, begin, FilmSums(impl_->pixels.size(), impl_->channels, impl_->film_scale), {}}));
+}
+
+void Renderer::extend(Accumulation& accumulation, std::uint32_t end, const RunControl& control) {
+    Accumulation::State& a = *accumulation.state_;
+    if (end <= a.end) return;
+    if (!impl_->tiles.empty()) impl_->run_pass(a, a.end, end, control);
+    a.end = end;
+}
+
+RenderResult Renderer::result(const Accumulation& accumulation) const {
+    const Accumulation::State& a = *accumulation.state_;
+    RenderResult result{{}, impl_->setup};
+    RenderStats& stats = result.stats;
+    stats.devices = a.devices;
+    stats.render_s = a.render_s;
+    stats.cpu_s = a.cpu_s;
+    stats.interrupted = a.interrupted;
+    stats.time_limited = a.time_limited;
+    stats.device_lost = a.device_lost;
     std::uint64_t active_paths = 0;
-    stats.samples_min = tiles.empty() ? empty_samples : UINT32_MAX;
-    for (std::size_t k = 0; k < pixels.size(); ++k) {
-        const std::uint32_t n = film.pixel(k).samples;
+    std::uint32_t empty_samples = a.end - a.begin;
+    stats.samples_min = impl_->tiles.empty() ? empty_samples : UINT32_MAX;
+    for (std::size_t k = 0; k < impl_->pixels.size(); ++k) {
+        const std::uint32_t n = a.film.pixel(k).samples;
         active_paths += n;
         stats.samples_min = std::min(stats.samples_min, n);
         stats.samples_max = std::max(stats.samples_max, n);
     }
-    if (tiles.empty()) stats.samples_max = empty_samples;
+    if (impl_->tiles.empty()) stats.samples_max = empty_samples;
     else empty_samples = stats.samples_max;
     stats.paths = active_paths + stats.empty_pixels * empty_samples;
-    stats.nonfinite_samples = film.nonfinite();
-    stats.work = film.work();
-    stats.excess = film.excess();
-    stats.bound_violations = film.violations();
+    stats.nonfinite_samples = a.film.nonfinite();
+    stats.work = a.film.work();
+    stats.excess = a.film.excess();
+    stats.bound_violations = a.film.violations();
     if (stats.bound_violations > 0)
         stats.warnings.push_back(fmt::format("the density exceeded its bound {} times: please report this scene", stats.bound_violations));
-    result.image = develop(scene, window, pixels, film, empty_samples, options.count_work);
+    result.image = develop(impl_->film, impl_->background, impl_->window, impl_->pixels, a.film, empty_samples, impl_->options.count_work);
     return result;
+}
+
+RenderResult render(const Scene& scene, const RenderOptions& options, const std::function<void(const Progress&)>& progress,
+                    const std::atomic<bool>& stop) {
+    Renderer renderer(scene, options);
+    Accumulation film = renderer.start(scene.render.seed, options.sample_begin);
+    renderer.extend(film, options.sample_end ? options.sample_end : scene.render.spp, {progress, &stop, options.time_limit_s});
+    return renderer.result(film);
 }
 
 }  // namespace clume

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -81,6 +82,7 @@ struct Progress {
     std::uint64_t paths_done = 0, paths_total = 0;
     double elapsed_s = 0;
     double mpaths_s = 0;
+    std::string what = {};  ///< part of a longer job
 };
 
 struct RenderResult {
@@ -88,9 +90,62 @@ struct RenderResult {
     RenderStats stats;
 };
 
-/// Throws RenderError, SceneError (a film too large), DeviceError (runtime/error.h; no device, all failed with nothing done).
-/// `progress` is called from one thread, a few times a second. `stop` set to true: batches under way are finished, then it
-/// returns what is done.
+/// How a run is watched and ended. `progress` is called from one thread, a few times a second. `stop` set to true, or the
+/// time up: batches under way are finished, then the run returns with what is done.
+struct RunControl {
+    std::function<void(const Progress&)> progress;
+    const std::atomic<bool>* stop = nullptr;
+    std::optional<double> time_limit_s;
+};
+
+/// The film of one seed: exact sums over the samples run so far, to which further ones add as if all had been run at once.
+class Accumulation {
+public:
+    ~Accumulation();
+    Accumulation(Accumulation&&) noexcept;
+    Accumulation& operator=(Accumulation&&) noexcept;
+
+    std::uint64_t seed() const;
+    std::uint32_t begin() const;  ///< samples [begin, end) were asked for
+    std::uint32_t end() const;
+    double render_s() const;      ///< spent rendering them, all runs together
+    bool complete() const;        ///< no run was stopped before its end: every pixel holds end − begin samples
+
+private:
+    friend class Renderer;
+    struct State;
+    explicit Accumulation(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+};
+
+/// A scene made ready on its devices (accelerator, self-tests, programs, buffers), which then renders any number of seeds and
+/// sample ranges; nothing is built again. render.seed and render.spp are not used. One thread at a time.
+class Renderer {
+public:
+    /// Keeps no reference to `scene`. Throws RenderError, SceneError (a film too large), DeviceError (runtime/error.h; no
+    /// device, none passes).
+    Renderer(const Scene& scene, RenderOptions options);
+    ~Renderer();
+    Renderer(Renderer&&) noexcept;
+    Renderer& operator=(Renderer&&) noexcept;
+
+    /// An empty film, whose first sample is to be `begin`.
+    Accumulation start(std::uint64_t seed, std::uint32_t begin = 0) const;
+    /// Runs samples [accumulation.end(), end). Only this is in stats.render_s. Throws DeviceError if no device is left and
+    /// the film is empty.
+    void extend(Accumulation& accumulation, std::uint32_t end, const RunControl& control = {});
+    /// Means, variances and statistics of what the film holds now.
+    RenderResult result(const Accumulation& accumulation) const;
+
+    /// What is known before the first path: names that `auto` became, build and compile times, sizes, explanation.
+    const RenderStats& setup() const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// One run of a Renderer made for it, with the scene's seed. Throws what its functions throw.
 RenderResult render(const Scene& scene, const RenderOptions& options, const std::function<void(const Progress&)>& progress,
                     const std::atomic<bool>& stop);
 

@@ -47,7 +47,8 @@ inline DeviceImage render_device(const Scene& scene, const DeviceScene& device, 
     image.pixels = active_pixels(scene, device, {0, 0, scene.film.width, scene.film.height});
     const std::vector<Tile> tiles{{0, static_cast<std::uint32_t>(image.pixels.size())}};
     FilmSums film(image.pixels.size(), define_of(device, "CLUME_CHANNELS") == "1" ? 1 : 3, static_cast<double>(device.params.film_scale));
-    DeviceRenderer renderer(select_devices({}).front(), device, image.pixels, tiles, 0, film);
+    DeviceRenderer renderer(select_devices({}).front(), device, image.pixels, tiles, 0);
+    renderer.aim(film, scene.render.seed);
     renderer.run({0, 0, spp});
     for (std::size_t i = 0; i < image.pixels.size(); ++i) image.values.push_back(film.pixel(i));
     image.nonfinite = film.nonfinite();

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+// The one table of distance sampling strategies and transmittance estimators: what each is called, whether it is biased, and
+// which media it can handle. Everything that lists, chooses or describes them reads it here.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "src/scene.h"
+
+namespace clume {
+
+enum class BiasKind { unbiased, consistent, biased };  ///< in the order of trust: a pair is what its worse half is
+
+/// "unbiased", "consistent" or "biased".
+const char* name_of(BiasKind kind);
+
+struct Method {
+    const char* name;
+    BiasKind kind;
+    bool mixtures, grids;   ///< media that it can handle
+    bool null_collisions;   ///< needs a bound of the extinction (render.bound)
+    const char* about;
+};
+
+std::span<const Method> strategies();
+std::span<const Method> estimators();
+/// What `render.bound` can be beside auto.
+std::span<const char* const> bounds();
+
+/// nullptr if there is none of that name.
+const Method* find_strategy(std::string_view name);
+const Method* find_estimator(std::string_view name);
+
+/// Whether it can handle every medium of the scene.
+bool fits(const Method& method, const Scene& scene);
+
+/// A strategy and an estimator that are run together, and the bound of null collisions that they use.
+struct MethodPair {
+    std::string strategy, estimator;
+    std::string bound = "auto";
+
+    /// "delta/ratio", "delta:scene/ratio" unless the bound is auto: as typed after --strategies.
+    std::string label() const;
+    /// The label as a file name.
+    std::string file_name() const;
+    /// `estimator_matters`: some light is sampled directly.
+    BiasKind kind(bool estimator_matters) const;
+    bool operator==(const MethodPair&) const = default;
+};
+
+/// Every pair that fits the scene; with an estimator that does not matter, one pair per strategy.
+std::vector<MethodPair> all_pairs(const Scene& scene, bool estimator_matters);
+
+/// The scene with the pair's names in its render settings.
+Scene with_pair(Scene scene, const MethodPair& pair);
+
+}  // namespace clume
