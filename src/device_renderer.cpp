@@ -2,6 +2,7 @@
 #include "src/device_renderer.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 
 #include "runtime/program.h"
@@ -46,6 +47,12 @@ void DeviceRenderer::aim(FilmSums& film, std::uint64_t seed) {
     params_.seed_lo = static_cast<device::uint>(seed);
     params_.seed_hi = static_cast<device::uint>(seed >> 32);
     scene_.params.upload(std::span(&params_, 1));
+}
+
+std::vector<float> DeviceRenderer::raised() const {
+    std::vector<float> bounds;
+    for (const device::uint b : scene_.raised.download()) bounds.push_back(std::bit_cast<float>(b));
+    return bounds;
 }
 
 std::size_t DeviceRenderer::render(const Tile& tile, std::uint32_t begin, std::uint32_t end) {

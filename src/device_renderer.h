@@ -29,6 +29,10 @@ public:
     /// Batches from now on use `seed` and add to `film`, which must outlive them. Throws DeviceError.
     void aim(FilmSums& film, std::uint64_t seed);
 
+    /// Bounds of `progressive` for the batches from now on, one per leaf; and the highest densities found above them so far.
+    void set_learned(std::span<const float> bounds) { scene_.learned.upload(bounds); }
+    std::vector<float> raised() const;
+
     std::string name() const override { return queue_.label(); }
     void run(const Batch& batch) override;
 

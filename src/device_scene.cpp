@@ -280,7 +280,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     define("CLUME_SCENE_BOUND", out.bound == "scene");
     if (r.root_finding == "bisection") define("CLUME_BISECTION", 1);
     define("CLUME_ACCEL", wanted.bvh ? 2 : 1);
-    define("CLUME_COUNT", options.count_work);
+    define("CLUME_COUNT", options.count_work || out.strategy == "progressive");  // its look-ups are reported
     if (wanted.bvh) define("CLUME_BVH_STACK", out.bvh_stack);
     if (!out.cells.empty()) define("CLUME_CELL_LEVELS", out.params.cells_levels);
 

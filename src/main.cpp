@@ -67,6 +67,7 @@ ImageMetadata describe(const Scene& scene, const RenderCommand& command, const R
     std::vector<std::string> overrides;
     for (const Override& o : command.overrides) overrides.push_back(o.key + "=" + o.value);
     if (!overrides.empty()) metadata.emplace_back("overrides", join(overrides, " "));
+    if (!stats.notes.empty()) metadata.emplace_back("notes", join(stats.notes, "\n"));
     if (!stats.warnings.empty()) metadata.emplace_back("warnings", join(stats.warnings, "\n"));
     if (stats.nonfinite_samples > 0) metadata.emplace_back("nonfiniteSamples", std::to_string(stats.nonfinite_samples));
     return metadata;
@@ -82,7 +83,8 @@ void print_explanation(const Scene& scene, const RenderOptions& options) {
 /// Says what is to be known about the render; the exit code.
 int report(const RenderStats& stats) {
     for (const std::string& warning : stats.warnings) say("warning: " + warning);
-    if (stats.bound_violations > 0)
+    for (const std::string& note : stats.notes) say(note);
+    if (stats.bound_violations > 0 && stats.strategy != "progressive")
         say(fmt::format("warning: density above its bound {} times: the image may be wrong", stats.bound_violations));
     if (stats.nonfinite_samples > 0)
         say(fmt::format("warning: {} samples were not finite and count as 0", stats.nonfinite_samples));

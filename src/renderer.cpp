@@ -91,6 +91,9 @@ struct Accumulation::State {
     std::vector<DeviceShare> devices;
     double render_s = 0, cpu_s = 0;
     bool interrupted = false, time_limited = false, device_lost = false;
+    std::vector<float> learned{};  ///< bounds of `progressive`; empty before the first pass
+
+    bool stopped() const { return interrupted || time_limited || device_lost; }
 };
 
 Accumulation::Accumulation(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -113,6 +116,7 @@ struct Renderer::Impl {
     std::vector<Tile> tiles;
     int channels = 3;
     double film_scale = 1;
+    std::vector<float> first_bounds;               ///< of `progressive`; empty for other strategies
     std::vector<std::unique_ptr<Worker>> workers;  ///< DeviceRenderers; a device that fails is dropped for good
 
     std::uint64_t all_pixels() const {
@@ -121,6 +125,8 @@ struct Renderer::Impl {
     void make_workers(const std::vector<DeviceInfo>& devices, const DeviceScene& device);
     /// Samples [begin, end) of every tile, by all devices.
     void run_pass(Accumulation::State& a, std::uint32_t begin, std::uint32_t end, const RunControl& control);
+    /// The same for `progressive`: passes under bounds that are frozen in each and raised after it.
+    void run_learning(Accumulation::State& a, std::uint32_t end, const RunControl& control);
 };
 
 void Renderer::Impl::make_workers(const std::vector<DeviceInfo>& devices, const DeviceScene& device) {
@@ -176,6 +182,44 @@ void Renderer::Impl::run_pass(Accumulation::State& a, std::uint32_t begin, std::
     a.time_limited = a.time_limited || (report.stopped && !stop_asked());
 }
 
+// A first look at how high the density goes: passes that the image does not hold, until few look-ups exceed their bound.
+// Then passes that double, each under what all before it have found, so that the share of the image made under low bounds
+// vanishes. Everything is a function of seed and sample numbers, and so are the bounds.
+void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, const RunControl& control) {
+    constexpr int most_warm_up = 24;
+    constexpr double enough = 1e-3;      // look-ups above their bound, of all
+    constexpr float margin = 1.25f;      // over what was found: the highest density is seldom hit
+    constexpr std::uint32_t first_warm_up_sample = 0x80000000u;
+    const auto pass = [&](Accumulation::State& film, std::uint32_t begin, std::uint32_t pass_end) {
+        for (const auto& w : workers) static_cast<DeviceRenderer&>(*w).set_learned(a.learned);
+        run_pass(film, begin, pass_end, control);
+        for (const auto& w : workers) {
+            const std::vector<float> raised = static_cast<DeviceRenderer&>(*w).raised();
+            for (std::size_t i = 0; i < a.learned.size(); ++i) a.learned[i] = std::max(a.learned[i], margin * raised[i]);
+        }
+    };
+    if (a.learned.empty()) {
+        a.learned = first_bounds;
+        const auto samples = static_cast<std::uint32_t>(std::max<std::size_t>(1, 16384 / pixels.size()));
+        for (int k = 0; k < most_warm_up; ++k) {
+            const std::uint32_t begin = first_warm_up_sample + static_cast<std::uint32_t>(k) * samples;
+            Accumulation::State scratch{a.seed, begin, begin, FilmSums(pixels.size(), channels, film_scale), {}};
+            pass(scratch, begin, begin + samples);
+            a.render_s += scratch.render_s;
+            a.cpu_s += scratch.cpu_s;
+            a.interrupted = scratch.interrupted;
+            a.time_limited = scratch.time_limited;
+            a.device_lost = scratch.device_lost;
+            if (a.stopped() || static_cast<double>(scratch.film.violations()) <= enough * static_cast<double>(scratch.film.work()[WORK_DENSITIES])) break;
+        }
+    }
+    while (a.end < end && !a.stopped()) {
+        const std::uint32_t pass_end = std::min(end, a.end + std::max(1u, a.end - a.begin));
+        pass(a, a.end, pass_end);
+        a.end = pass_end;
+    }
+}
+
 Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_unique<Impl>()) {
     impl_->film = scene.film;
     impl_->background = background(scene);
@@ -209,6 +253,7 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     const bool grey = std::find(device.defines.begin(), device.defines.end(), std::pair<std::string, std::string>("CLUME_CHANNELS", "1")) != device.defines.end();
     impl_->channels = grey ? 1 : 3;
     impl_->film_scale = static_cast<double>(device.params.film_scale);
+    impl_->first_bounds = device.learned;
     impl_->make_workers(devices, device);
 }
 
@@ -225,7 +270,7 @@ Accumulation Renderer::start(std::uint64_t seed, std::uint32_t begin) const {
 void Renderer::extend(Accumulation& accumulation, std::uint32_t end, const RunControl& control) {
     Accumulation::State& a = *accumulation.state_;
     if (end <= a.end) return;
-    if (!impl_->tiles.empty()) impl_->run_pass(a, a.end, end, control);
+    if (!impl_->tiles.empty()) impl_->first_bounds.empty() ? impl_->run_pass(a, a.end, end, control) : impl_->run_learning(a, end, control);
     a.end = end;
 }
 
@@ -255,7 +300,11 @@ RenderResult Renderer::result(const Accumulation& accumulation) const {
     stats.work = a.film.work();
     stats.excess = a.film.excess();
     stats.bound_violations = a.film.violations();
-    if (stats.bound_violations > 0)
+    if (!impl_->first_bounds.empty())
+        stats.notes.push_back(fmt::format("progressive: {} of {} look-ups found the density above its learned bound ({:.3g} %), which took {:.3g} % of the density looked up", stats.bound_violations,
+                                          stats.work[WORK_DENSITIES], 100.0 * static_cast<double>(stats.bound_violations) / std::max(1.0, static_cast<double>(stats.work[WORK_DENSITIES])),
+                                          100.0 * stats.excess / std::max(1.0, static_cast<double>(stats.work[WORK_DENSITIES]))));
+    else if (stats.bound_violations > 0)
         stats.warnings.push_back(fmt::format("the density exceeded its bound {} times: please report this scene", stats.bound_violations));
     result.image = develop(impl_->film, impl_->background, impl_->window, impl_->pixels, a.film, empty_samples, impl_->options.count_work);
     return result;

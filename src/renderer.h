@@ -74,6 +74,7 @@ struct RenderStats {
     bool interrupted = false, time_limited = false;
     bool device_lost = false;                  ///< no device was left before the end; the image holds what was done
     std::uint32_t samples_min = 0, samples_max = 0;  ///< held per pixel
+    std::vector<std::string> notes;            ///< what a strategy has to say of this image, such as how often a learned bound was too low
     std::vector<std::string> warnings;         ///< e.g. a dropped device, a device outside the bit-exact set
     std::vector<std::pair<std::string, std::string>> explain;  ///< feature → what the program does about it
 };

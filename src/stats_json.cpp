@@ -93,6 +93,7 @@ std::string stats_to_json(const RenderStats& stats) {
     put_member(out, "time_limited", stats.time_limited);
     put_member(out, "samples_min", stats.samples_min);
     put_member(out, "samples_max", stats.samples_max);
+    put_member(out, "notes", stats.notes);
     put_member(out, "warnings", stats.warnings);
     out.Key("explain");
     out.StartObject();
