@@ -156,17 +156,19 @@ VoxelGrid BrickSet::build(const LeafSource& leaves) {
         if (entry.source == no_source) {
             std::fill(std::begin(samples), std::end(samples), entry.value);
         } else {
+            float in_file[brick_samples];
             std::uint64_t active[8] = {};
-            leaves(entry.source, samples, active);
-            for (int i = 0; i < static_cast<int>(brick_samples); ++i) {
-                if ((active[i / 64] >> (i % 64) & 1) == 0) {
-                    samples[i] = background_;
-                    continue;
-                }
-                const glm::ivec3 at = entry.origin + glm::ivec3(i % 8, i / 8 % 8, i / 64);
-                grow(at, at + 1);
-                samples[i] = admit(samples[i], at);
-            }
+            leaves(entry.source, in_file, active);
+            for (int z = 0, i = 0; z < 8; ++z)
+                for (int y = 0; y < 8; ++y)
+                    for (int x = 0; x < 8; ++x, ++i) {
+                        const int n = 64 * x + 8 * y + z;
+                        samples[i] = background_;
+                        if ((active[n / 64] >> (n % 64) & 1) == 0) continue;
+                        const glm::ivec3 at = entry.origin + glm::ivec3(x, y, z);
+                        grow(at, at + 1);
+                        samples[i] = admit(in_file[n], at);
+                    }
         }
         if (std::all_of(std::begin(samples), std::end(samples), [&](float v) { return v == background_; })) continue;
         grid.brick_origins.push_back(entry.origin);

@@ -34,26 +34,27 @@ class BrickSet {
     /// Messages begin with `name`. Samples are `background`, clamped to 0, where nothing is set. Throws if it isn't finite.
     BrickSet(std::string name, double background);
 
-    /// A brick whose samples come later, or one that is all `value`. `origin`: a multiple of 8 within the largest coordinates.
-    struct Entry {
-        glm::ivec3 origin;
-        float value = 0;
-        std::uint32_t source = no_source;  ///< the caller's number of the samples' source; none: all are `value`
-    };
-    static constexpr std::uint32_t no_source = 0xFFFFFFFF;
-
-    void add(const Entry& entry) { entries_.push_back(entry); }
-    /// All bricks of the active box [lo, hi), multiples of 8, that hold `value`; none are made if that is the background.
+    /// A brick of samples that build() asks for.
+    void add_leaf(const glm::ivec3& origin, std::uint32_t source) { entries_.push_back({origin, 0, source}); }
+    /// An active cube at `lo`, a multiple of 8, all `value`; its bricks aren't made if that is the background.
     void add_tile(const glm::ivec3& lo, int side, double value);
     float background() const { return background_; }
 
-    /// Fills 512 samples of a source and says which are active (bit x + 8 y + 64 z); the others become background.
+    /// Fills the 512 samples of a source and says which are active (bit n % 64 of active[n / 64]); the others become background.
+    /// In the order of VDB leaves: sample (x, y, z) is n = 64 x + 8 y + z.
     using LeafSource = std::function<void(std::uint32_t source, float* samples, std::uint64_t active[8])>;
     /// The grid, placed at the lattice itself; lo and hi bound the active samples. Throws SceneError if two bricks are in one
     /// place, if an active sample isn't finite, or if it doesn't fit in memory.
     VoxelGrid build(const LeafSource& leaves);
 
   private:
+    static constexpr std::uint32_t no_source = 0xFFFFFFFF;
+    struct Entry {
+        glm::ivec3 origin;
+        float value;           ///< of all samples, without a source
+        std::uint32_t source;  ///< the caller's number of where the samples are
+    };
+
     [[noreturn]] void fail(const std::string& why) const;
     float admit(float value, const glm::ivec3& at);
     void grow(const glm::ivec3& lo, const glm::ivec3& hi);
