@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "src/vol_file.h"
-
+// Mitsuba's .vol, version 3: "VOL", the version, encoding, resolution, channels and a bounding box, 48 bytes, then samples at
+// the centres of the box's voxels, x fastest. The format is documented with Mitsuba's `gridvolume`.
 #include <ImathConfig.h>
 #include <fmt/format.h>
 #include <half.h>
@@ -84,21 +84,6 @@ class VolFile : public VoxelFile {
 };
 
 }  // namespace
-
-std::string vol_header(const glm::ivec3& size, const glm::dvec3& min, const glm::dvec3& max) {
-    std::string out = "VOL\x03";
-    const auto put = [&](auto value) {
-        char bytes[sizeof value];
-        std::memcpy(bytes, &value, sizeof value);
-        out.append(bytes, sizeof value);
-    };
-    put(std::int32_t{float32});
-    for (int i = 0; i < 3; ++i) put(static_cast<std::int32_t>(size[i]));
-    put(std::int32_t{1});
-    for (const glm::dvec3& corner : {min, max})
-        for (int i = 0; i < 3; ++i) put(static_cast<float>(corner[i]));
-    return out;
-}
 
 std::unique_ptr<VoxelFile> open_vol(const std::filesystem::path& path) { return std::make_unique<VolFile>(path); }
 

@@ -235,6 +235,13 @@ std::pair<glm::dvec3, glm::dvec3> world_box(const VoxelGrid& grid) {
     return {middle - reach, middle + reach};
 }
 
+std::uint64_t brick_count(const VoxelGrid& grid) {
+    std::uint64_t out = 1;
+    for (int i = 0; i < 3; ++i)
+        out *= grid.lo[i] < grid.hi[i] ? static_cast<std::uint64_t>((((grid.hi[i] + 7) & ~7) - (grid.lo[i] & ~7)) / 8) : 0;
+    return out;
+}
+
 std::uint64_t byte_size(const VoxelGrid& grid) {
     return grid.values.size() * sizeof(float) + grid.brick_origins.size() * sizeof(glm::ivec3);
 }
