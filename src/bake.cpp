@@ -194,7 +194,7 @@ BakedMedium describe_baked(const Scene& scene, const std::string& file) {
     out.json = fmt::format(R"({{"type": "grid", "file": {})", json_string(file));
     if (first != nullptr && one_albedo) out.json += fmt::format(R"(, "albedo": {})", colour(first->albedo));
     if (!one_albedo && weight_sum > 0)
-        out.json += fmt::format(R"(, "albedo": {})", colour(glm::round(1e4 * albedo_sum / weight_sum) * 1e-4));
+        out.json += fmt::format(R"(, "albedo": {})", colour(glm::round(1e4 * albedo_sum / weight_sum) / 1e4));
     if (first != nullptr && one_emission && first->emission != glm::dvec3(0))
         out.json += fmt::format(R"(, "emission": {})", colour(first->emission));
     if (first != nullptr && one_phase) {
