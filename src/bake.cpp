@@ -89,6 +89,13 @@ void splat(const Splat& s, const VoxelGrid& grid, int z0, int z1, std::vector<do
         }
 }
 
+/// The nearest number that a float can hold. Through memory, because GCC 12 leaves such pairs of conversions out where it makes
+/// vectors of them.
+double rounded_to_float(double value) {
+    volatile float rounded = static_cast<float>(value);
+    return static_cast<double>(rounded);
+}
+
 /// The lattice, without samples.
 VoxelGrid place(const Scene& scene, const std::vector<Splat>& splats, int resolution) {
     glm::dvec3 lo(INFINITY), hi(-INFINITY);
@@ -106,8 +113,8 @@ VoxelGrid place(const Scene& scene, const std::vector<Splat>& splats, int resolu
         // A hair less than the next whole number is rounding.
         grid.hi[i] = std::clamp(static_cast<int>(std::ceil(size[i] / voxel - 1e-9)), 1, resolution);
         const double middle = 0.5 * (lo[i] + hi[i]), half = 0.5 * voxel * grid.hi[i];
-        min[i] = static_cast<double>(static_cast<float>(middle - half));
-        max[i] = static_cast<double>(static_cast<float>(middle + half));
+        min[i] = rounded_to_float(middle - half);
+        max[i] = rounded_to_float(middle + half);
     }
     place_in_box(grid, min, max);
     if (!is_placed(grid) || !glm::all(glm::lessThan(min, max)))

@@ -59,8 +59,8 @@ openvdb::GridBase::Ptr make_grid(const LibraryGrid& g) {
     grid->setSaveFloatAsHalf(g.kind == "half");
     grid->setGridClass(g.kind == "level set" ? openvdb::GRID_LEVEL_SET : openvdb::GRID_FOG_VOLUME);
     if (g.kind == "frustum")
-        grid->setTransform(openvdb::math::Transform::createFrustumTransform(
-            openvdb::BBoxd(openvdb::Vec3d(0), openvdb::Vec3d(8)), 0.5, 10));
+        grid->setTransform(
+            openvdb::math::Transform::createFrustumTransform(openvdb::BBoxd(openvdb::Vec3d(0), openvdb::Vec3d(8)), 0.5, 10));
     else
         grid->setTransform(openvdb::math::Transform::Ptr(new openvdb::math::Transform(make_map(g))));
     return grid;
@@ -106,7 +106,8 @@ void write_library_nvdb(const std::filesystem::path& path, const std::vector<Lib
                                                : nanovdb::io::Codec::NONE);
 }
 
-LibrarySamples read_by_library(const std::filesystem::path& path, const std::string& name, const std::vector<glm::ivec3>& points) {
+LibrarySamples read_by_library(const std::filesystem::path& path, const std::string& name,
+                               const std::vector<glm::ivec3>& points) {
     LibrarySamples out;
     if (path.extension() == ".nvdb") {
         const auto handle = nanovdb::io::readGrid(path.string(), name);

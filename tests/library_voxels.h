@@ -51,6 +51,7 @@ struct LibrarySamples {
     glm::ivec3 lo, hi;  ///< of the active voxels, half-open
     std::vector<glm::dvec3> world;
 };
-LibrarySamples read_by_library(const std::filesystem::path& path, const std::string& name, const std::vector<glm::ivec3>& points);
+LibrarySamples read_by_library(const std::filesystem::path& path, const std::string& name,
+                               const std::vector<glm::ivec3>& points);
 
 }  // namespace clume::test

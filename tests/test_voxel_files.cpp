@@ -82,7 +82,8 @@ TEST_CASE("VoxelFiles.EveryFormatReadsTheSame", "[quick]") {
     folder.write("own.nvdb", nvdb_bytes(dense));
 
     const std::string raw_keys = R"(, "resolution": [19, 9, 26], "bounds": [[-2, 1, 0.5], [2.75, 3.25, 7]])";
-    for (const char* name : {"a.raw", "a.vol", "a.vdb", "none.nvdb", "zip.nvdb", "blosc.nvdb", "own.vol", "own.vdb", "own.nvdb"}) {
+    for (const char* name :
+         {"a.raw", "a.vol", "a.vdb", "none.nvdb", "zip.nvdb", "blosc.nvdb", "own.vol", "own.vdb", "own.nvdb"}) {
         INFO(name);
         const GridMedium medium =
             read_medium(folder, "\"file\": \"" + std::string(name) + "\"" + (name == std::string("a.raw") ? raw_keys : ""));
@@ -132,7 +133,8 @@ TEST_CASE("VoxelFiles.WritersAgreeWithTheLibraries", "[quick]") {
         std::size_t wrong = 0;
         for (std::size_t i = 0; i < points.size(); ++i)
             wrong += sample_at(here, points[i]) != there.values[i] || sample_at(grid, points[i]) != there.values[i] ||
-                     !(glm::distance(world(here, points[i]), there.world[i]) < 1e-9) || world(here, points[i]) != world(grid, points[i]);
+                     !(glm::distance(world(here, points[i]), there.world[i]) < 1e-9) ||
+                     world(here, points[i]) != world(grid, points[i]);
         CHECK(wrong == 0);
     }
 }
@@ -163,19 +165,28 @@ TEST_CASE("VoxelFiles.VdbAgreesWithTheLibrary", "[quick]") {
         g.axes = glm::dmat3(0.5, 0, 0, 0, 0.5, 0, 0, 0, 0.5);
         g.origin = {1, 2, 3};
         std::uint32_t state = 7;
-        const float inactive[8][2] = {{background, background}, {-background, -background}, {5, 5}, {background, -background},
-                                      {background, 5},          {4, 5},                     {0, 0}, {0, 0}};
+        const float inactive[8][2] = {{background, background},
+                                      {-background, -background},
+                                      {5, 5},
+                                      {background, -background},
+                                      {background, 5},
+                                      {4, 5},
+                                      {0, 0},
+                                      {0, 0}};
         for (int kind = 0; kind < 8; ++kind)
             for (int n = 0; n < 512; ++n) {
                 state = state * 1664525u + 1013904223u;
-                const glm::ivec3 at = glm::ivec3(8 * kind - 32, kind % 2 == 0 ? -8 : 0, 8 * (kind % 3)) +
-                                      glm::ivec3(n % 8, n / 8 % 8, n / 64);
+                const glm::ivec3 at =
+                    glm::ivec3(8 * kind - 32, kind % 2 == 0 ? -8 : 0, 8 * (kind % 3)) + glm::ivec3(n % 8, n / 8 % 8, n / 64);
                 const bool active = kind == 7 || state >> 30 != 0;
                 const float value = static_cast<float>((state >> 8) & 1023) / 256;
                 // Kind 6 has more inactive values than a mask can tell.
                 g.voxels.push_back({at, active ? value : kind == 6 ? value + 10 : inactive[kind][n % 2], active});
             }
-        g.tiles = {{{8, 8, -16}, 8, 1.5f}, {{128, 0, 0}, 128, 0.75f}, {{-128, -128, -128}, 128, 9, false}, {{16, 8, -16}, 8, 7, false},
+        g.tiles = {{{8, 8, -16}, 8, 1.5f},
+                   {{128, 0, 0}, 128, 0.75f},
+                   {{-128, -128, -128}, 128, 9, false},
+                   {{16, 8, -16}, 8, 7, false},
                    {{4096, 0, 0}, 4096, background, false}};
         return g;
     };
@@ -213,16 +224,18 @@ TEST_CASE("VoxelFiles.VdbTransforms", "[quick]") {
         INFO(map);
         LibraryGrid g = ball_grid();
         g.map = map;
-        g.axes = map == std::string("affine")    ? glm::dmat3(0, 2, 0.5, -1, 0, 0, 0, 0.25, 4)
-                 : map == std::string("unitary") ? glm::dmat3(0, 1, 0, -1, 0, 0, 0, 0, 1)
-                                                 : glm::dmat3(2, 0, 0, 0, map[0] == 'u' ? 2 : -3, 0, 0, 0, map[0] == 'u' ? 2 : 0.5);
+        g.axes = map == std::string("affine") ? glm::dmat3(0, 2, 0.5, -1, 0, 0, 0, 0.25, 4)
+                 : map == std::string("unitary")
+                     ? glm::dmat3(0, 1, 0, -1, 0, 0, 0, 0, 1)
+                     : glm::dmat3(2, 0, 0, 0, map[0] == 'u' ? 2 : -3, 0, 0, 0, map[0] == 'u' ? 2 : 0.5);
         write_library_vdb(folder.path() / "a.vdb", {g});
         write_library_nvdb(folder.path() / "a.nvdb", {g}, "zip");
         const std::vector<glm::ivec3> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {5, -7, 11}};
         for (const char* name : {"a.vdb", "a.nvdb"}) {
             const LibrarySamples there = read_by_library(folder.path() / name, "density", points);
             const VoxelGrid here = read_file(folder.path() / name);
-            for (std::size_t i = 0; i < points.size(); ++i) CHECK(glm::distance(world(here, points[i]), there.world[i]) < 1e-12);
+            for (std::size_t i = 0; i < points.size(); ++i)
+                CHECK(glm::distance(world(here, points[i]), there.world[i]) < 1e-12);
         }
     }
 }

@@ -46,7 +46,8 @@ inline std::string medium_error(const TempFolder& folder, const std::string& key
         std::string message = error.what();
         CHECK(message.find('\n') == std::string::npos);
         const std::string prefix = folder.path().string() + "/";
-        for (auto at = message.find(prefix); at != std::string::npos; at = message.find(prefix)) message.erase(at, prefix.size());
+        for (auto at = message.find(prefix); at != std::string::npos; at = message.find(prefix))
+            message.erase(at, prefix.size());
         return message;
     }
     return "";
