@@ -60,19 +60,24 @@ bool is_raw(const std::filesystem::path& path) {
 
 /// Density and emission grid in the file's own placement.
 void read_file(GridMedium& medium, const SectionReader& section, const std::filesystem::path& path) {
-    const auto name_of = [&](const char* key) {
-        return section.given(key) ? std::optional<std::string>(section.text(key)) : std::nullopt;
-    };
     const auto file = open_voxel_file(path);
     const auto& entries = file->entries();
     const bool nameless = entries.size() == 1 && entries[0].name.empty();
     for (const char* key : {"grid", "emission_grid"})
         if (section.given(key) && nameless && path.extension() == ".vol")
             section.fail(key, fmt::format("\"{}\" names a grid, and a .vol file has one grid without a name", key));
-    const std::size_t density = find_grid(path, entries, name_of("grid"));
+    const auto find = [&](const char* key) {
+        if (!section.given(key)) return find_grid(path, entries, {});
+        try {
+            return find_grid(path, entries, section.text(key));
+        } catch (const SceneError& error) {
+            section.source().fail_asset(section.at(key), error.what());
+        }
+    };
+    const std::size_t density = find("grid");
     medium.grid_name = entries[density].name;
     medium.density = file->read(density);
-    if (const auto name = name_of("emission_grid")) medium.emission_grid = file->read(find_grid(path, entries, name));
+    if (section.given("emission_grid")) medium.emission_grid = file->read(find("emission_grid"));
 }
 
 }  // namespace
@@ -107,7 +112,7 @@ GridMedium read_grid(const SectionReader& section, const std::filesystem::path& 
             read_file(medium, section, path);
     } catch (const SceneError& error) {
         const std::string what = error.what();
-        if (!what.starts_with(path.string())) throw;  // about a key, placed already
+        if (!what.starts_with(path.string() + ": ")) throw;  // about a key, placed already
         section.source().fail_asset(section.at("file"), what);
     }
 

@@ -7,6 +7,7 @@
 
 #include "src/bvh.h"
 #include "src/device_scene.h"
+#include "src/error.h"
 #include "src/json_reader.h"
 #include "src/renderer.h"
 #include "src/voxel_file.h"
@@ -67,6 +68,7 @@ double depth_through_middle(const std::vector<Ellipsoid>& ellipsoids, const Box&
 
 void print_info(const std::filesystem::path& file, std::span<const Override> overrides) {
     if (is_voxel_file(file)) {
+        if (!overrides.empty()) throw UsageError("-D " + overrides[0].key + ": a voxel file has no keys of a scene");
         print_voxel_info(file);
         return;
     }

@@ -179,13 +179,14 @@ TEST_CASE("VoxelErrors.GridsThatCannotBeMediaAreListed", "[quick]") {
     write_library_nvdb(folder.path() / "a.nvdb", grids, "blosc");
     for (const std::string name : {"a.vdb", "a.nvdb"}) {
         check(error(name, ""), "s.json:3:27: " + name + ": no grid that can be a medium; it holds \"level set\" (a level set)");
-        check(error(name, R"(, "grid": "level set")"), "grid \"level set\" cannot be a medium: a level set; it holds");
+        check(error(name, R"(, "grid": "level set")"), name + ": grid \"level set\" cannot be a medium: a level set; it holds");
         check(error(name, R"(, "grid": "vector")"), "grid \"vector\" cannot be a medium: not a float grid but ");
         check(error(name, R"(, "grid": "int")"), "grid \"int\" cannot be a medium: not a float grid but ");
         check(error(name, R"(, "grid": "densty")"),
               name + ": no grid \"densty\"; it holds \"level set\" (a level set), \"vector\" (not");
     }
-    check(error("a.vdb", R"(, "grid": "frustum")"), "cannot be a medium: a grid with a frustum transform");
+    check(error("a.vdb", R"(, "grid": "frustum")"),
+          "s.json:3:44: a.vdb: grid \"frustum\" cannot be a medium: a grid with a frustum transform");
 
     grids.assign(3, small_grid());
     grids[0].name = "heat";
