@@ -163,7 +163,7 @@ int run(const BakeCommand& command) {
     }
     std::fputs((command.output.string() + "\n").c_str(), stdout);
     const auto [least, most] = sample_range(*grid);
-    say(fmt::format("{} x {} x {} voxels, density {:.4g} to {:.4g}, {} of {} bricks hold something", grid->hi.x, grid->hi.y,
+    say(fmt::format("{} x {} x {} voxels, density {:.4g} to {:.4g}, {} of {:.0f} bricks hold something", grid->hi.x, grid->hi.y,
                     grid->hi.z, least, most, grid->brick_origins.size(), brick_count(*grid)));
     const std::filesystem::path folder = std::filesystem::absolute(command.scene).parent_path();
     const BakedMedium medium = describe_baked(scene, std::filesystem::absolute(command.output).lexically_proximate(folder));

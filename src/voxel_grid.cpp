@@ -174,6 +174,8 @@ VoxelGrid BrickSet::build(const LeafSource& leaves) {
         grid.brick_origins.push_back(entry.origin);
         grid.values.insert(grid.values.end(), std::begin(samples), std::end(samples));
     }
+    grid.brick_origins.shrink_to_fit();
+    grid.values.shrink_to_fit();
     if (lo_.x < hi_.x) {
         grid.lo = lo_;
         grid.hi = hi_;
@@ -235,11 +237,10 @@ std::pair<glm::dvec3, glm::dvec3> world_box(const VoxelGrid& grid) {
     return {middle - reach, middle + reach};
 }
 
-std::uint64_t brick_count(const VoxelGrid& grid) {
-    std::uint64_t out = 1;
-    for (int i = 0; i < 3; ++i)
-        out *= grid.lo[i] < grid.hi[i] ? static_cast<std::uint64_t>((((grid.hi[i] + 7) & ~7) - (grid.lo[i] & ~7)) / 8) : 0;
-    return out;
+double brick_count(const VoxelGrid& grid) {
+    if (grid.lo.x >= grid.hi.x) return 0;
+    const glm::dvec3 bricks = (((grid.hi + 7) & ~7) - (grid.lo & ~7)) / 8;
+    return bricks.x * bricks.y * bricks.z;
 }
 
 std::uint64_t byte_size(const VoxelGrid& grid) {

@@ -81,8 +81,8 @@ std::pair<float, float> sample_range(const VoxelGrid& grid);
 /// World box of the lattice box [lo − ½, hi − ½].
 std::pair<glm::dvec3, glm::dvec3> world_box(const VoxelGrid& grid);
 
-/// Bricks that [lo, hi) touches, stored or not.
-std::uint64_t brick_count(const VoxelGrid& grid);
+/// Bricks that [lo, hi) touches, stored or not; a sparse grid's may be more than 64 bits count.
+double brick_count(const VoxelGrid& grid);
 
 /// Bytes of the stored bricks.
 std::uint64_t byte_size(const VoxelGrid& grid);

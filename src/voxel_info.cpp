@@ -27,7 +27,7 @@ void print_grid(const VoxelGrid& grid, double scale) {
     fmt::print("    bounds        {} to {}\n", triple(min), triple(max));
     fmt::print("    values        {:.4g} to {:.4g}{}\n", least * scale, most * scale,
                grid.negative > 0 ? fmt::format(" ({} negative ones taken as 0)", grid.negative) : "");
-    fmt::print("    stored        {} of {} bricks, {} bytes\n", grid.brick_origins.size(), brick_count(grid), byte_size(grid));
+    fmt::print("    stored        {} of {:.0f} bricks, {} bytes\n", grid.brick_origins.size(), brick_count(grid), byte_size(grid));
 }
 
 }  // namespace
