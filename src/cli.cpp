@@ -14,8 +14,10 @@
 #include <map>
 #include <numeric>
 
+#include "src/bake.h"
 #include "src/error.h"
 #include "src/scene_schema.h"
+#include "src/voxel_writer.h"
 
 namespace clume {
 
@@ -168,6 +170,17 @@ RenderCommand check_render(RenderTexts texts, RenderCommand command) {
     return command;
 }
 
+BakeCommand check_bake(const std::string& scene, const std::string& output, std::optional<long long> resolution) {
+    if (scene.empty()) throw UsageError("bake: which scene? Such as: clume bake scenes/plume.json --resolution 256 -o plume.nvdb");
+    if (output.empty()) throw UsageError("bake: into which file? Such as: -o smoke.vol, smoke.nvdb or smoke.vdb");
+    if (!can_write_voxels(output)) throw UsageError("-o " + output + ": must end in .vol, .nvdb or .vdb");
+    if (!resolution) throw UsageError("bake: how many voxels along the longest axis? Such as: --resolution 256");
+    if (*resolution < 1 || *resolution > most_bake_resolution)
+        throw UsageError("--resolution " + std::to_string(*resolution) + ": must lie between 1 and " +
+                         std::to_string(most_bake_resolution));
+    return {scene, output, static_cast<int>(*resolution), {}, false};
+}
+
 }  // namespace
 
 std::string nearest_flag(std::string_view word, std::span<const std::string> names) {
@@ -252,12 +265,26 @@ Command parse_command_line(int argc, const char* const* argv) {
     CLI::App* devices = app.add_subcommand("devices", "list the OpenCL devices of this machine")->allow_extras();
     std::string info_file;
     std::vector<std::string> info_definitions;
-    CLI::App* info = app.add_subcommand("info", "say what is in a scene or a PLY file")->allow_extras();
-    info->add_option("FILE", info_file, "scene (JSON) or ellipsoids (PLY)")->type_name("");
+    CLI::App* info = app.add_subcommand("info", "say what is in a scene, a PLY file or a voxel file")->allow_extras();
+    info->add_option("FILE", info_file, "scene (JSON), ellipsoids (PLY) or voxels (VDB, NVDB, VOL)")->type_name("");
     CLI::Option* info_definition = info->add_option("-D", info_definitions, "override any key of the scene")
                                        ->type_name("KEY=VALUE")
                                        ->take_all()
                                        ->allow_extra_args(false);
+    std::string bake_scene, bake_output;
+    std::optional<long long> resolution;
+    std::vector<std::string> bake_definitions;
+    bool bake_quiet = false;
+    CLI::App* bake = app.add_subcommand("bake", "turn a scene's ellipsoids into a voxel file; prints its path")->allow_extras();
+    bake->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    bake->add_option("SCENE", bake_scene, "scene file (JSON, docs/scene.md)")->type_name("");
+    bake->add_option("-o,--output", bake_output, "voxel file to write")->type_name("OUT.vol|.nvdb|.vdb");
+    bake->add_option("--resolution", resolution, "voxels along the longest axis of the mixture's bounds")->type_name("N");
+    CLI::Option* bake_definition = bake->add_option("-D", bake_definitions, "override any key of the scene")
+                                       ->type_name("KEY=VALUE")
+                                       ->take_all()
+                                       ->allow_extra_args(false);
+    bake->add_flag("--quiet", bake_quiet, "no progress on stderr");
     app.add_subcommand("bench", "measure speed; see clume bench --help");
 
     try {
@@ -272,7 +299,7 @@ Command parse_command_line(int argc, const char* const* argv) {
         throw UsageError(text);
     }
     refuse_leftovers(app, nullptr);
-    for (const CLI::App* sub : {render, devices, info})
+    for (const CLI::App* sub : {render, devices, info, bake})
         if (sub->parsed()) refuse_leftovers(*sub, &app);
     if (app.get_subcommands().size() > 1) throw UsageError("one subcommand at a time");
 
@@ -285,7 +312,13 @@ Command parse_command_line(int argc, const char* const* argv) {
         if (info_file.empty()) throw UsageError("info: which file? Such as: clume info scenes/plume.json");
         return InfoCommand{info_file, collect_overrides(*info, info_definition, {})};
     }
-    throw UsageError("which subcommand? render, devices, info or bench; see clume --help");
+    if (bake->parsed()) {
+        BakeCommand out = check_bake(bake_scene, bake_output, resolution);
+        out.overrides = collect_overrides(*bake, bake_definition, {});
+        out.quiet = bake_quiet;
+        return out;
+    }
+    throw UsageError("which subcommand? render, devices, info, bake or bench; see clume --help");
 }
 
 }  // namespace clume

@@ -35,12 +35,19 @@ struct InfoCommand {
     std::vector<Override> overrides;
 };
 
+struct BakeCommand {
+    std::filesystem::path scene, output;
+    int resolution = 0;  ///< voxels along the longest axis
+    std::vector<Override> overrides;
+    bool quiet = false;
+};
+
 /// --help and --version: `text` goes to stdout.
 struct PrintCommand {
     std::string text;
 };
 
-using Command = std::variant<PrintCommand, RenderCommand, DevicesCommand, InfoCommand>;
+using Command = std::variant<PrintCommand, RenderCommand, DevicesCommand, InfoCommand, BakeCommand>;
 
 /// Throws UsageError with one line that names the nearest right flag or subcommand. `bench` is the caller's: its arguments
 /// are not parsed here.

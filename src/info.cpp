@@ -7,7 +7,11 @@
 
 #include "src/bvh.h"
 #include "src/device_scene.h"
+#include "src/error.h"
+#include "src/json_reader.h"
 #include "src/renderer.h"
+#include "src/voxel_file.h"
+#include "src/voxel_info.h"
 
 namespace clume {
 namespace {
@@ -27,17 +31,6 @@ double whitened2(const Ellipsoid& e, const glm::dvec3& p) {
     const glm::dvec3 x = p - e.center;
     const double a = e.w[0] * x.x + e.w[1] * x.y + e.w[2] * x.z, b = e.w[3] * x.y + e.w[4] * x.z, c = e.w[5] * x.z;
     return a * a + b * b + c * c;
-}
-
-/// As a JSON string.
-std::string quoted(const std::string& s) {
-    std::string out = "\"";
-    for (const char c : s) {
-        if (c == '"' || c == '\\') out += '\\';
-        if (static_cast<unsigned char>(c) < 0x20) out += fmt::format("\\u{:04x}", c);
-        else out += c;
-    }
-    return out + '"';
 }
 
 /// How many supports hold p.
@@ -74,11 +67,16 @@ double depth_through_middle(const std::vector<Ellipsoid>& ellipsoids, const Box&
 }  // namespace
 
 void print_info(const std::filesystem::path& file, std::span<const Override> overrides) {
+    if (is_voxel_file(file)) {
+        if (!overrides.empty()) throw UsageError("-D " + overrides[0].key + ": a voxel file has no keys of a scene");
+        print_voxel_info(file);
+        return;
+    }
     Scene scene;
     if (file.extension() == ".ply") {
         const std::string text = fmt::format(
             R"({{"camera": {{"origin": [0, 0, -4], "target": [0, 0, 0]}}, "lights": [{{"type": "constant", "radiance": 1}}], "media": [{{"type": "ellipsoids", "kernel": "gaussian", "file": {}}}]}})",
-            quoted(std::filesystem::absolute(file).string()));
+            json_string(std::filesystem::absolute(file).string()));
         scene = parse_scene(text, file, overrides);
     } else {
         scene = read_scene(file, overrides);
@@ -102,6 +100,7 @@ void print_info(const std::filesystem::path& file, std::span<const Override> ove
         fmt::print("    bounds        {} to {}\n", triple(lo), triple(hi));
         fmt::print("    extinction    peaks of {:.4g} to {:.4g} per world unit\n", least, most);
     }
+    for (std::size_t g = 0; g < scene.grids.size(); ++g) print_grid_medium(scene.media.size() + g, scene.grids[g]);
     const DeviceScene device = make_device_scene(scene, {});
     const auto& ellipsoids = device.ellipsoids;
     if (!ellipsoids.empty()) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// `clume info`: what a scene or PLY file holds and what it will cost.
+// `clume info`: what a scene, a PLY file or a voxel file holds and what it will cost.
 #pragma once
 
 #include <filesystem>

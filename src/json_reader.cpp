@@ -46,6 +46,18 @@ std::string_view json_type_name(JsonType type) {
     return "";
 }
 
+std::string json_string(std::string_view text) {
+    std::string out = "\"";
+    for (const char c : text) {
+        if (c == '"' || c == '\\') out += '\\';
+        if (static_cast<unsigned char>(c) < 0x20)
+            out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+        else
+            out += c;
+    }
+    return out + '"';
+}
+
 std::string in_quotes(std::string_view text) {
     constexpr std::size_t most = 80;
     std::string out = "\"";

@@ -53,6 +53,9 @@ std::string_view json_type_name(JsonType type);
 /// `text` in double quotes, control characters escaped and long text cut, so that a message stays one line.
 std::string in_quotes(std::string_view text);
 
+/// The text as a JSON string, quotes included.
+std::string json_string(std::string_view text);
+
 /// Reads one JSON document. Throws SceneError "file:line:column: what is wrong".
 JsonValue parse_json(std::string_view text, const std::string& file);
 

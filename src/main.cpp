@@ -14,15 +14,19 @@
 #include "bench/bench.h"
 #include "runtime/device.h"
 #include "runtime/error.h"
+#include "src/bake.h"
 #include "src/cli.h"
 #include "src/error.h"
 #include "src/image_writer.h"
 #include "src/info.h"
 #include "src/interrupt.h"
+#include "src/output_file.h"
 #include "src/progress.h"
 #include "src/renderer.h"
 #include "src/scene_reader.h"
 #include "src/stats_json.h"
+#include "src/voxel_grid.h"
+#include "src/voxel_writer.h"
 
 namespace {
 
@@ -143,6 +147,30 @@ int run(const DevicesCommand&) {
 
 int run(const InfoCommand& command) {
     print_info(command.file, command.overrides);
+    return 0;
+}
+
+int run(const BakeCommand& command) {
+    check_writable(command.output);
+    install_interrupt_handlers();
+    const Scene scene = read_scene(command.scene, command.overrides);
+    PartReporter progress("baking", command.quiet);
+    const auto grid = bake(
+        scene, command.resolution, [&](double part) { progress.update(part); }, stop_requested());
+    progress.finish();
+    if (grid) write_voxel_file(command.output, *grid);
+    if (!grid) {
+        say("interrupted: nothing was written");
+        return interrupted_exit_code;
+    }
+    std::fputs((command.output.string() + "\n").c_str(), stdout);
+    const auto [least, most] = sample_range(*grid);
+    say(fmt::format("{} x {} x {} voxels, density {:.4g} to {:.4g}, {} of {:.0f} bricks hold something", grid->hi.x, grid->hi.y,
+                    grid->hi.z, least, most, grid->brick_origins.size(), brick_count(*grid)));
+    const std::filesystem::path folder = std::filesystem::absolute(command.scene).parent_path();
+    const BakedMedium medium = describe_baked(scene, std::filesystem::absolute(command.output).lexically_proximate(folder));
+    say("in a scene: " + medium.json);
+    for (const std::string& loss : medium.losses) say("warning: " + loss);
     return 0;
 }
 

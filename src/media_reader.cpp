@@ -12,6 +12,7 @@
 
 #include "src/ellipsoid.h"
 #include "src/error.h"
+#include "src/medium_keys.h"
 #include "src/ply_reader.h"
 
 namespace clume {
@@ -19,11 +20,6 @@ namespace clume {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-
-struct Transform {
-    glm::dmat3 linear{1};
-    glm::dvec3 translate{0};
-};
 
 /// What a medium's own keys say about each of its primitives.
 struct MediumContext {
@@ -44,60 +40,6 @@ double central_depth(KernelFamily kernel, double extent) {
             return 2 * extent;
     }
     return 0;
-}
-
-bool is_singular(const glm::dmat3& m) {
-    const double lengths = glm::length(m[0]) * glm::length(m[1]) * glm::length(m[2]);
-    const double determinant = std::abs(glm::determinant(m));
-    return !std::isfinite(determinant) || !std::isfinite(lengths) || !(determinant > 1e-14 * lengths);
-}
-
-Transform read_transform(const SectionReader& medium) {
-    Transform out;
-    const SectionReader section = medium.section("transform");
-    if (const JsonValue* matrix = section.value("matrix")) {
-        for (const char* key : {"scale", "rotate", "translate"})
-            if (section.given(key)) section.fail(key, fmt::format("\"{}\" and \"matrix\" exclude each other", key));
-        if (matrix->items.size() != 4) section.fail("matrix", "\"matrix\" must be four rows of four numbers");
-        for (int row = 0; row < 4; ++row) {
-            const JsonValue& values = matrix->items[static_cast<std::size_t>(row)];
-            if (values.type != JsonType::array || values.items.size() != 4)
-                section.source().fail(values.at, "\"matrix\" must be four rows of four numbers");
-            for (int column = 0; column < 4; ++column) {
-                const JsonValue& value = values.items[static_cast<std::size_t>(column)];
-                if (value.type != JsonType::number)
-                    section.source().fail(value.at,
-                                          fmt::format("\"matrix\" must hold numbers, not {}", json_type_name(value.type)));
-                if (row == 3 && value.number != (column == 3 ? 1 : 0))
-                    section.source().fail(value.at, "the last row of \"matrix\" must be 0, 0, 0, 1");
-                if (row == 3) continue;
-                if (column == 3)
-                    out.translate[row] = value.number;
-                else
-                    out.linear[column][row] = value.number;
-            }
-        }
-        if (is_singular(out.linear)) section.fail("matrix", "\"matrix\" is singular");
-        return out;
-    }
-    const glm::dvec3 scale = section.triple("scale");
-    if (scale.x == 0 || scale.y == 0 || scale.z == 0) section.fail("scale", "\"scale\" of a transform must not be 0");
-    out.linear = glm::dmat3(scale.x, 0, 0, 0, scale.y, 0, 0, 0, scale.z);
-    if (section.given("rotate")) {
-        const SectionReader rotate = section.section("rotate");
-        const glm::dvec3 axis = rotate.triple("axis");
-        if (!(glm::length(axis) > 0)) rotate.fail("axis", "\"axis\" must not be zero");
-        out.linear = glm::mat3_cast(glm::angleAxis(glm::radians(rotate.number("angle")), glm::normalize(axis))) * out.linear;
-    }
-    out.translate = section.triple("translate");
-    return out;
-}
-
-Phase read_phase(const SectionReader& medium) {
-    const SectionReader section = medium.section("phase");
-    if (section.variant() == "rayleigh") return {PhaseKind::rayleigh, 0};
-    if (section.variant() == "henyey-greenstein") return {PhaseKind::henyey_greenstein, section.number("g")};
-    return {};
 }
 
 /// Lower triangular L with Σ = L Lᵀ; empty if Σ is not positive definite.
@@ -225,22 +167,7 @@ void read_file(MediumContext& context, const SectionReader& medium, const std::f
 
 }  // namespace
 
-std::filesystem::path find_asset(const SectionReader& section, std::string_view key, const std::filesystem::path& folder) {
-    const std::string name = section.text(key);
-    const std::filesystem::path path = folder / name;
-    std::error_code error;
-    const auto status = std::filesystem::status(path, error);
-    if (!std::filesystem::exists(status))
-        section.source().fail_asset(section.at(key), fmt::format("no such file: {}", in_quotes(path.string())));
-    if (!std::filesystem::is_regular_file(status))
-        section.source().fail_asset(section.at(key), fmt::format("not a file: {}", in_quotes(path.string())));
-    return path;
-}
-
-EllipsoidMedium read_medium(const SceneSource& source, const JsonValue& value, const std::filesystem::path& folder) {
-    if (const JsonMember* type = value.find("type"); type != nullptr && type->value.text == "grid")
-        source.fail_asset(type->value.at, "grid media are not supported yet");
-    const SectionReader section(source, "media", &value, value.at);
+EllipsoidMedium read_ellipsoids(const SectionReader& section, const std::filesystem::path& folder) {
     EllipsoidMedium medium;
     const std::string kernel = section.text("kernel");
     medium.kernel = kernel == "gaussian"  ? KernelFamily::gaussian
@@ -258,7 +185,7 @@ EllipsoidMedium read_medium(const SceneSource& source, const JsonValue& value, c
 
     const bool from_file = section.given("file"), from_list = section.given("primitives");
     if (from_file && from_list) section.fail("primitives", "\"file\" and \"primitives\" exclude each other");
-    if (!from_file && !from_list) source.fail(section.at(), "missing key \"file\" or \"primitives\" in media");
+    if (!from_file && !from_list) section.source().fail(section.at(), "missing key \"file\" or \"primitives\" in media");
     if (from_list) {
         for (const char* key : {"scale_encoding", "density_encoding"})
             if (section.given(key)) section.fail(key, fmt::format("\"{}\" speaks about a file, and there is none", key));

@@ -101,6 +101,25 @@ void ProgressReporter::finish() {
     mode_ = Mode::silent;
 }
 
+PartReporter::PartReporter(std::string name, bool quiet)
+    : name_(std::move(name)), silent_(quiet), bar_(on_terminal()), drawn_(std::chrono::steady_clock::now()) {}
+
+void PartReporter::update(double part) {
+    const auto now = std::chrono::steady_clock::now();
+    if (silent_ || now - drawn_ < (bar_ ? std::chrono::nanoseconds(redraw_interval) : line_interval)) return;
+    drawn_ = now;
+    const std::string text = fmt::format("{} {:3.0f} %", name_, std::floor(100 * part));
+    std::fputs((bar_ ? "\r" + text + "\x1b[K" : text + "\n").c_str(), stderr);
+    std::fflush(stderr);
+    open_line_ = bar_;
+}
+
+void PartReporter::finish() {
+    if (open_line_) std::fputs("\r\x1b[K", stderr);
+    open_line_ = false;
+    silent_ = true;
+}
+
 void ProgressReporter::draw() {
     drawn_last_ = true;
     if (mode_ == Mode::bar)

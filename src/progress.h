@@ -34,6 +34,26 @@ class ProgressReporter {
     bool drawn_last_ = false;
 };
 
+/// The same for work that has no paths: what is done in percent.
+class PartReporter {
+  public:
+    /// `name` is what is going on, such as "baking"; `quiet` silences it.
+    PartReporter(std::string name, bool quiet);
+    ~PartReporter() { finish(); }
+    PartReporter(const PartReporter&) = delete;
+    PartReporter& operator=(const PartReporter&) = delete;
+
+    /// `part` of it is done, 0 to 1.
+    void update(double part);
+    /// Ends the line; later updates are ignored.
+    void finish();
+
+  private:
+    std::string name_;
+    bool silent_, bar_, open_line_ = false;
+    std::chrono::steady_clock::time_point drawn_;
+};
+
 /// "0:07", "12:34", "3:04:05"; "-:--" for what isn't finite or negative.
 std::string format_duration(double seconds);
 

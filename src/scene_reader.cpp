@@ -11,9 +11,12 @@
 
 #include "src/environment_reader.h"
 #include "src/error.h"
+#include "src/grid_reader.h"
 #include "src/input_file.h"
 #include "src/media_reader.h"
+#include "src/medium_keys.h"
 #include "src/scene_schema.h"
+#include "src/voxel_grid.h"
 
 namespace clume {
 
@@ -217,6 +220,14 @@ bool emits(const EllipsoidMedium& medium) {
     return false;
 }
 
+/// Whether there is density that emits, or any value in the emission grid, times something.
+bool emits(const GridMedium& medium) {
+    const bool any_colour = glm::any(glm::greaterThan(medium.emission, glm::dvec3(0)));
+    if (medium.emission_grid) return any_colour && sample_range(*medium.emission_grid).second > 0;
+    return medium.density_scale > 0 && glm::any(glm::greaterThan((1.0 - medium.albedo) * medium.emission, glm::dvec3(0))) &&
+           sample_range(medium.density).second > 0;
+}
+
 Scene build_scene(const JsonValue& root, const SceneSource& source, const Path& name) {
     const SectionReader top(source, "scene", &root, root.at);
     const Path folder = name.parent_path();
@@ -242,7 +253,13 @@ Scene build_scene(const JsonValue& root, const SceneSource& source, const Path& 
     bool emission = false;
     if (const JsonValue* media = top.value("media"))
         for (const JsonValue& item : media->items) {
-            scene.media.push_back(read_medium(source, item, folder));
+            const SectionReader section(source, "media", &item, item.at);
+            if (section.variant() == "grid") {
+                scene.grids.push_back(read_grid(section, folder));
+                emission = emission || emits(scene.grids.back());
+                continue;
+            }
+            scene.media.push_back(read_ellipsoids(section, folder));
             emission = emission || emits(scene.media.back());
             primitives += scene.media.back().primitives.size();
             if (primitives > most_primitives) source.fail(item.at, "more primitives than 32-bit numbers can name");

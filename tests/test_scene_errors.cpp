@@ -153,7 +153,7 @@ TEST_CASE("Scene.MediaChecks", "[quick]") {
     medium(R"("scale_encoding": "log",)", "s.json:6:68: \"scale_encoding\" speaks about a file");
     check_error("\"gaussian\"", "\"gausian\"", "s.json:6:39: unknown kernel \"gausian\"", "did you mean \"gaussian\"?");
     check_error("\"primitives\": [ " + primitive + " ]", "\"file\": \"none.ply\"", "s.json:7:15: no such file: \"none.ply\"");
-    check_error("\"ellipsoids\"", "\"grid\"", "s.json:6:15: grid media are not supported yet");
+    check_error("\"ellipsoids\"", "\"grid\"", "s.json:6:23: key \"kernel\" does not belong to media of type \"grid\"");
     check_error("\"ellipsoids\"", "\"elipsoids\"", "s.json:6:15: unknown type \"elipsoids\"", "did you mean \"ellipsoids\"?");
     const std::string rayleigh = changed(kernel, kernel + R"("phase": {"type": "rayleigh"},)");
     CHECK(scene_error(changed("\"density\": 2", "\"density\": 2, \"g\": 0", rayleigh))
