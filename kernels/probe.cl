@@ -120,6 +120,28 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
     out[i] = r;
 }
 
+#if CLUME_GRIDS
+/// Ray i as in probe_ray, direction.w an optical depth tau, against grid g alone: out the depth up to t_end, where it reaches
+/// tau (CLUME_INFINITY if not), the density at along(o, d, t_end), the emission grid's integral up to t_end times emission.x.
+__kernel void probe_grid(SCENE_ARGS, __global const float4* rays, __global float4* out, uint count, uint g) {
+    const uint i = (uint)get_global_id(0);
+    if (i >= count) return;
+    const float3 o = rays[2 * i].xyz, d = rays[2 * i + 1].xyz;
+    const float t_end = rays[2 * i].w, tau = rays[2 * i + 1].w;
+    Work work;
+    work_clear(&work);
+    float4 r = (float4)0.0f, origin, direction;
+    r.x = convert_float_rte(grid_depth(g, o, d, t_end, ~(ulong)0, &work, SCENE)) * 0x1p-40f;
+    r.y = grid_invert(g, o, d, t_end, tau, &work, SCENE);
+    float begin = t_end, end = t_end + fabs(t_end) * 0x1p-20f;
+    if (grid_clip(grids + g, o, d, &origin, &direction, &begin, &end)) r.z = grid_value(grids + g, fma((float4)t_end, direction, origin), grid_cells, grid_values);
+#if CLUME_GRID_EMISSION
+    r.w = grids_emission(o, d, t_end, &work, SCENE).x;
+#endif
+    out[i] = r;
+}
+#endif
+
 /// Camera rays of pixels' samples, as probe_ray takes them.
 __kernel void probe_camera(SCENE_ARGS, __global const uint* pixels, __global float4* rays, uint count, uint sample) {
     const uint i = (uint)get_global_id(0);

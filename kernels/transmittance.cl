@@ -4,6 +4,7 @@
 // exponential number e, and the answer is exp(−CLUME_EXACT_DEPTH) if the whole depth stays below CLUME_EXACT_DEPTH + e,
 // else 0. That has the right mean, ends as soon as a partial sum exceeds the limit, and does not depend on the order.
 #include "bvh.cl"
+#include "grid_transmittance.cl"
 
 #ifndef CLUME_EXACT_DEPTH  // in units of 1
 #define CLUME_EXACT_DEPTH 2
@@ -17,11 +18,10 @@ static ulong transmittance_limit(float e) {
 /// Estimate of the transmittance from o along d up to t_end; `limit` from transmittance_limit.
 static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit, Work* work, SCENE_ARGS) {
     ulong depth = 0;
-#if CLUME_ACCEL == ACCEL_CELLS
+#if CLUME_MIXTURE && CLUME_ACCEL == ACCEL_CELLS
     CellWalk w;
-    if (!cells_enter(&w, o, d, 0.0f, t_end, params, cells)) return 1.0f;
     float lower = -CLUME_INFINITY;
-    do {
+    if (cells_enter(&w, o, d, 0.0f, t_end, params, cells)) do {
         if (w.entry.link >= CELL_EMPTY_MAX) {
             const CellLeaf leaf = leaves[w.entry.link - CELL_EMPTY_MAX];
             for (uint g = leaf.first_group; g < leaf.first_group + leaf.group_count; ++g)
@@ -32,8 +32,12 @@ static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit
         COUNT(work, WORK_CELLS, 1);
         lower = w.t_exit;
     } while (cells_next(&w, CLUME_CELL_LEVELS, cells));
-#else
+#elif CLUME_MIXTURE
     depth = bvh_depth(o, d, 0.0f, t_end, limit, work, SCENE);
+    if (depth >= limit) return 0.0f;
+#endif
+#if CLUME_GRIDS
+    depth = grids_depth(depth, o, d, t_end, limit, work, SCENE);
     if (depth >= limit) return 0.0f;
 #endif
     const ulong exact = (ulong)CLUME_EXACT_DEPTH << 40;

@@ -41,4 +41,8 @@ struct Cells {
 /// `max_references` bounds the duplication; it is kept to by larger cells, never by dropping a primitive.
 Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const CellCosts& costs, std::size_t max_references);
 
+/// For each empty root (an entry below CELL_EMPTY_MAX) of a table, x fastest, the Chebyshev distance to the nearest root that
+/// is not empty, capped: how far a ray may leap. Beyond the table all is empty.
+void measure_emptiness(std::span<std::uint32_t> roots, const glm::uvec3& counts);
+
 }  // namespace clume

@@ -25,13 +25,17 @@ struct SceneBuffers {
           shading(queue, scene.shading),
           lights(queue, scene.lights),
           texels(queue, scene.texels),
-          alias(queue, scene.alias) {}
+          alias(queue, scene.alias),
+          grids(queue, scene.grids),
+          grid_cells(queue, scene.grid_cells),
+          grid_values(queue, scene.grid_values) {}
 
-    static constexpr unsigned kArgs = 13;  ///< arguments that `bind` sets
+    static constexpr unsigned kArgs = 16;  ///< arguments that `bind` sets
 
     /// Sets arguments 0 to kArgs − 1.
     void bind(Queue& queue, cl::Kernel& kernel) const {
-        set_args(queue, kernel, 0, params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias);
+        set_args(queue, kernel, 0, params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias, grids, grid_cells,
+                 grid_values);
     }
 
     Buffer<device::RenderParams> params;
@@ -47,6 +51,9 @@ struct SceneBuffers {
     Buffer<device::LightInfo> lights;
     Buffer<device::float4> texels;
     Buffer<device::AliasEntry> alias;
+    Buffer<device::GridInfo> grids;
+    Buffer<device::CellEntry> grid_cells;
+    Buffer<float> grid_values;
 };
 
 }  // namespace clume
