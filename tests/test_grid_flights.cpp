@@ -15,7 +15,7 @@ using reference::HostGrid;
 
 /// What flights along one ray must do: per medium (the mixture, then each grid) and bin of t, probabilities; last the escape.
 struct Law {
-    static constexpr std::size_t bins = 24;
+    static constexpr std::size_t bins = 23;  ///< no edge of theirs is one of a voxel: rounding may put a t on the far side
     std::vector<double> expected;
     double t0 = 1e300, t1 = 0;  ///< normalised
     std::size_t media;
@@ -40,7 +40,7 @@ struct Law {
         t0 = *std::min_element(cuts.begin(), cuts.end());
         t1 = std::min(*std::max_element(cuts.begin(), cuts.end()), static_cast<double>(r.t_end));
         // Fine steps: shares by the middle's densities, depths exact.
-        constexpr int steps = 24 * 400;
+        constexpr int steps = static_cast<int>(bins) * 400;
         double depth = 0;
         for (int i = 0; i < steps; ++i) {
             const double a = t0 + (t1 - t0) * i / steps, b = t0 + (t1 - t0) * (i + 1) / steps, middle = 0.5 * (a + b);
