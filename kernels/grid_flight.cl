@@ -2,7 +2,7 @@
 // Free flights through voxel grids, each grid with random numbers of its own. A strategy gives the t of a collision, or
 // CLUME_INFINITY. `regular`: cell by cell, exact depths, inverted in the last. `march`: fixed steps from the ray's origin.
 // `delta`: null collisions under the bounds of the bricks, of a table of the grid's own, or one for all of it.
-#include "grid.cl"
+#include "grid_bounds.cl"
 #if CLUME_GRIDS
 
 /// Where the optical depth of grid g reaches tau, CLUME_INFINITY if not before t_end: through bricks, then cells.
@@ -69,62 +69,6 @@ static float grid_flight_march(uint g, float3 o, float3 d, float t_end, uint ran
         tau -= depth;
         k += 1.0f;
     }
-}
-
-/// The walk whose cells bound the density: over the bricks, the grid's own table, or (CLUME_SCENE_BOUND) one segment.
-static bool bounds_enter(CellWalk* w, __global const GridInfo* grid, float3 o, float3 d, float t_end, __global const CellEntry* grid_cells) {
-#if CLUME_SCENE_BOUND || CLUME_GRID_BOUNDS
-    float4 origin, direction;
-    float t_begin = 0.0f;
-    if (!grid_clip(grid, o, d, &origin, &direction, &t_begin, &t_end)) return false;
-#if CLUME_SCENE_BOUND
-    w->origin = origin;
-    w->direction = direction;
-    w->t = t_begin;
-    w->t_exit = t_end;
-    w->t_end = t_end;
-    w->entry.link = CELL_EMPTY_MAX;
-    w->entry.majorant = grid->bound;
-    w->entry.reference = 0u;
-    return grid->bound > 0.0f;
-#else
-    const float scale = grid->bounds_scale;
-    return cells_begin(w, (origin - grid->lower) * scale, direction * scale, t_begin, t_end, grid->bounds_x, grid->bounds_y, grid->bounds_z, 0, grid_cells + grid->first_bound);
-#endif
-#else
-    return grid_enter(w, grid, o, d, 0.0f, t_end, grid_cells);
-#endif
-}
-
-static bool bounds_next(CellWalk* w, __global const GridInfo* grid, __global const CellEntry* grid_cells) {
-#if CLUME_SCENE_BOUND
-    return false;
-#elif CLUME_GRID_BOUNDS
-    return cells_next(w, 0, grid_cells + grid->first_bound);
-#else
-    return grid_next(w, grid, grid_cells);
-#endif
-}
-
-/// Density at t, in the present cell of the bounds' walk.
-static float bounds_value(const CellWalk* w, __global const GridInfo* grid, float t, __global const CellEntry* grid_cells, __global const float* grid_values) {
-#if CLUME_SCENE_BOUND
-    return grid_value(grid, fma((float4)t, w->direction, w->origin), grid_cells, grid_values);
-#elif CLUME_GRID_BOUNDS
-    const float scale = rcp_s(grid->bounds_scale);
-    return grid_value(grid, fma(fma((float4)t, w->direction, w->origin), (float4)scale, grid->lower), grid_cells, grid_values);
-#else
-    return walk_value(w, grid, t, grid_values);
-#endif
-}
-
-/// HOOK of `progressive`: the majorant that null collisions work with in a cell of the bounds' walk ...
-static float bounds_majorant(const CellWalk* w) { return w->entry.majorant; }
-
-/// ... and what becomes of the density sigma looked up under it: counted as a violation where it is above.
-static float bounds_look_up(const CellWalk* w, float sigma, float majorant, Flight* f) {
-    f->violations += sigma > majorant ? 1u : 0u;
-    return min_s(sigma, majorant);
 }
 
 /// `delta` [Novak18]: the residual optical depth is carried from cell to cell.

@@ -56,7 +56,7 @@ static void collision_properties(uint primitive, spectrum* albedo, spectrum* emi
 }
 
 /// What a light adds at x for a path that came along d, before beta.
-static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws* r, Work* work, SCENE_ARGS) {
+static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws* r, Flight* flight, SCENE_ARGS) {
 #if CLUME_NEE
     LightSample s;
 #if CLUME_NEE & LIGHT_ENVMAP
@@ -71,7 +71,7 @@ static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws*
     if (blocker != NO_LIGHT) return (spectrum)0.0f;
     const float value = phase_value(phase, g, dot_s(d, s.direction));
     const float weight = (lights[s.light].kind & CLUME_HITS) ? divide_s(s.pdf, s.pdf + value) : 1.0f;
-    return s.value * (value * weight * transmittance_analytic(x, s.direction, s.distance, transmittance_limit(exponential_s(bits.w)), work, SCENE));
+    return s.value * (value * weight * transmittance_estimate(x, s.direction, s.distance, bits.w, r, flight, SCENE));
 #else
     return (spectrum)0.0f;
 #endif
@@ -135,7 +135,7 @@ static void path_event(Path* p, uint pixel, SCENE_ARGS) {
     }
     const float3 x = along_s(p->o, p->d, p->flight.t);
 #if CLUME_NEE
-    p->radiance += p->beta * path_light(x, p->d, phase, g, &r, &p->flight.work, SCENE);
+    p->radiance += p->beta * path_light(x, p->d, phase, g, &r, &p->flight, SCENE);
 #endif
     p->d = phase_sample(phase, g, p->d, draw_bits(&r, DRAW_PHASE), &p->phase_pdf);
     p->o = x;

@@ -88,7 +88,7 @@ __kernel void probe_group_work(__global const float* groups, __global const floa
 
 /// Ray i, two float4: origin with t_end, direction. Free flight by the program's strategy up to t_end: out t
 /// (CLUME_INFINITY if it escapes), primitive (as_uint), transmittance to t_end, groups and single primitives evaluated (as_uint; 0 unless counted). what: 1 flight, 2 transmittance, 4 transmittance
-/// by roulette past CLUME_EXACT_DEPTH, as the renderer has it.
+/// by roulette past CLUME_EXACT_DEPTH, 8 transmittance by the program's estimator.
 __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4* out, uint count, uint sample, uint what) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
@@ -98,12 +98,12 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
     Draws draws = {sample, i, 1, (uint2)(params->seed_lo, params->seed_hi)};
     Flight f;
     work_clear(&f.work);
+    f.t = 0.0f;
+    f.draw = 0;
+    f.primitive = CLUME_NO_PRIMITIVE;
+    f.violations = 0;
+    f.excess = 0;
     if (what & 1u) {
-        f.t = 0.0f;
-        f.draw = 0;
-        f.primitive = CLUME_NO_PRIMITIVE;
-        f.violations = 0;
-        f.excess = 0;
         int result;
         do result = flight_sample(o, d, t_end, &f, &draws, SCENE);
         while (result == FLIGHT_PAUSED);
@@ -113,6 +113,7 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
         }
     }
     const float roulette = what & 4u ? exponential_s(draw_bits(&draws, 1).x) : CLUME_INFINITY;
+    if (what & 8u) r.z = transmittance_estimate(o, d, t_end, draw_bits(&draws, 1).x, &draws, &f, SCENE);
     if (what & 6u) r.z = transmittance_analytic(o, d, t_end, transmittance_limit(roulette), &f.work, SCENE);
 #if CLUME_COUNT
     r.w = as_float((uint)(f.work.n[WORK_GROUPS] + f.work.n[WORK_PRIMITIVES]));

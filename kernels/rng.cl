@@ -13,6 +13,7 @@
 #define DRAW_CAMERA 0xf0000002u
 #define DRAW_ROULETTE 0xf0000003u
 #define DRAW_LIGHT_MORE 0xf0000004u
+#define DRAW_SHADOW 0x40000000u  // and on: transmittance estimates
 
 /// 128 random bits; counter = (sample, pixel, depth, draw), key = seed. 64-bit products: some mul_hi are slow.
 static uint4 philox(uint4 counter, uint2 key) {

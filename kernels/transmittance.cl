@@ -43,3 +43,15 @@ static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit
     const ulong exact = (ulong)CLUME_EXACT_DEPTH << 40;
     return depth_transmittance(limit < ((ulong)128 << 40) && depth > exact ? exact : depth);
 }
+
+/// Estimate from o along d up to t_end; `bits`: for the roulette of `analytic`, the others take random numbers of r. Work and
+/// violations of bounds are added to those of `path`.
+static float transmittance_estimate(float3 o, float3 d, float t_end, uint bits, const Draws* r, Flight* path, SCENE_ARGS) {
+#if CLUME_TRANSMITTANCE == TRANSMITTANCE_ANALYTIC
+    return transmittance_analytic(o, d, t_end, transmittance_limit(exponential_s(bits)), &path->work, SCENE);
+#elif CLUME_GRIDS
+    return grids_transmittance(o, d, t_end, r, path, SCENE);
+#else
+    return 1.0f;
+#endif
+}

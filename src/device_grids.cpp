@@ -41,6 +41,7 @@ struct Layout {
     double shift;           ///< ½ for voxels that are centred on lattice points
     glm::ivec3 bricks;      ///< of the table, before it is rounded up to whole roots
     std::vector<glm::ivec3> stored;  ///< bricks of the table that hold something, ascending by (z, y, x)
+    std::vector<float> most;         ///< largest value of each
 
     Layout(const VoxelGrid& g, Interpolation i, double f) : grid(g), interpolation(i), factor(f), support(support_of(g, i)), shift(i == Interpolation::nearest ? 0.5 : 0) {
         // First cell met by the support; sparse tables are aligned with the file's own bricks.
@@ -131,16 +132,16 @@ void find_stored(Layout& l) {
         std::sort(candidates.begin(), candidates.end(), [&](const glm::ivec3& a, const glm::ivec3& b) { return key(a) < key(b); });
         candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
     }
-    std::vector<char> holds(candidates.size());
+    std::vector<float> most(candidates.size());
     parallel_chunks(candidates.size(), 256, [&](std::size_t begin, std::size_t end) {
         float values[GRID_BRICK_VALUES];
         for (std::size_t i = begin; i < end; ++i) {
             gather(l, candidates[i], values);
-            holds[i] = extremes(l, values).second > 0;
+            most[i] = extremes(l, values).second;
         }
     });
     for (std::size_t i = 0; i < candidates.size(); ++i)
-        if (holds[i]) l.stored.push_back(candidates[i]);
+        if (most[i] > 0) l.stored.push_back(candidates[i]), l.most.push_back(most[i]);
 }
 
 std::uint32_t levels_of(const Layout& l) {
@@ -218,6 +219,33 @@ void add_bounds(const Layout& l, double per_root, int along, std::size_t first_v
     for (std::size_t i = 0; i < most.size(); ++i) out.grid_cells.push_back({links[i], static_cast<float>(static_cast<double>(most[i]) * kSlack), 0, 0});
 }
 
+/// Edge, in bricks, of a table's cells that makes flights through the media cheapest: steps against tentative collisions.
+int cheapest_edge(const Layout& l, double scale) {
+    // Nanoseconds of one core for a step from cell to cell and for a tentative collision (tests on a 256³ cloud).
+    constexpr double step = 28, tentative = 55;
+    const double voxel = std::cbrt(std::abs(glm::determinant(l.grid.axes))) * scale;
+    int best = 1;
+    double least = 1e300;
+    for (const int edge : {1, 2, 3, 4, 6, 8, 12, 16}) {
+        const glm::ivec3 counts = (l.bricks + edge - 1) / edge;
+        if (edge > 1 && std::max({counts.x, counts.y, counts.z}) < 2) break;
+        const double cells = static_cast<double>(counts.x) * counts.y * counts.z;
+        if (cells > 0x1p24) continue;
+        std::vector<float> bound(static_cast<std::size_t>(cells), 0);
+        for (std::size_t i = 0; i < l.most.size(); ++i) {
+            const glm::ivec3 c = l.stored[i] / edge;
+            float& b = bound[static_cast<std::size_t>(c.x) + static_cast<std::size_t>(counts.x) * (static_cast<std::size_t>(c.y) + static_cast<std::size_t>(counts.y) * static_cast<std::size_t>(c.z))];
+            b = std::max(b, l.most[i]);
+        }
+        const double size = edge * kBrick * voxel, volume = std::pow(edge, 3);
+        double cost = 0;
+        for (const float b : bound)
+            if (b > 0) cost += volume * (1.5 / size * step + static_cast<double>(b) * tentative);
+        if (cost < least) least = cost, best = edge;
+    }
+    return best;
+}
+
 /// Appends one laid-out grid.
 void add_grid(const Layout& l, std::uint32_t levels, int bounds, DeviceScene& out) {
     device::GridInfo info{};
@@ -257,13 +285,11 @@ void add_grid(const Layout& l, std::uint32_t levels, int bounds, DeviceScene& ou
     const std::vector<std::uint32_t> table = make_table(l, roots, levels);
     out.grid_cells.resize(first_entry + table.size());
     std::vector<device::CellEntry> leaf(l.stored.size());
-    std::vector<float> most(l.stored.size());
     parallel_chunks(l.stored.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             float* values = out.grid_values.data() + first_value + GRID_BRICK_VALUES * i;
             gather(l, l.stored[i], values);
             const auto [least, largest] = extremes(l, values);
-            most[i] = largest;
             leaf[i] = {0, static_cast<float>(static_cast<double>(largest) * kSlack), std::bit_cast<std::uint32_t>(least), least == largest};
         }
     });
@@ -275,7 +301,7 @@ void add_grid(const Layout& l, std::uint32_t levels, int bounds, DeviceScene& ou
         entry = leaf[link - CELL_EMPTY_MAX];
         entry.link = link;
     }
-    for (const float m : most) info.bound = std::max(info.bound, static_cast<float>(static_cast<double>(m) * kSlack));
+    for (const float m : l.most) info.bound = std::max(info.bound, static_cast<float>(static_cast<double>(m) * kSlack));
     if (bounds > 0) add_bounds(l, per_root, bounds, first_value, info, out);
     out.grids.push_back(info);
 }
@@ -297,6 +323,34 @@ std::array<glm::dvec3, 8> stored_corners(const Layout& l) {
 
 }  // namespace
 
+void define_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out) {
+    if (scene.grids.empty()) return;
+    const auto define = [&](const char* name, std::size_t value) {
+        for (auto& [key, text] : out.defines)
+            if (key == name) return void(text = std::to_string(value));
+        out.defines.emplace_back(name, std::to_string(value));
+    };
+    define("CLUME_GRIDS", scene.grids.size());
+    define("CLUME_GRID_LEVELS", traits.levels);
+    define("CLUME_GRID_KINDS", traits.kinds);
+    define("CLUME_GRID_BOUNDS", traits.tables);
+    define("CLUME_GRID_EMISSION", traits.emission_grids);
+    define("CLUME_SCENE_BOUND", scene.render.bound == "scene");
+    const char* estimators[] = {"analytic", "march", "ratio", "residual-ratio", "binary"};
+    for (std::size_t i = 0; i < std::size(estimators); ++i)
+        if (out.transmittance == estimators[i]) define("CLUME_TRANSMITTANCE", i + 1);
+    if (scene.render.root_finding == "bisection") define("CLUME_BISECTION", 1);
+}
+
+void explain_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out) {
+    if (scene.grids.empty()) return;
+    const char* bound = scene.render.bound == "scene" ? "null collisions under one bound each" : traits.tables ? "null collisions under a table of bounds" : "null collisions under the bricks' bounds";
+    const bool nulls = out.strategy == "delta" || out.strategy == "progressive";
+    out.explain.emplace_back("voxel media", fmt::format("{}: {} bricks of 8x8x8, {} octree levels, flights by {}", scene.grids.size(), traits.bricks, traits.levels,
+                                                        nulls ? bound : out.strategy == "march" ? "marching" : "exact walks from voxel to voxel"));
+    out.explain.emplace_back("emission grids", traits.emission_grids ? "integrated along every flight" : "left out");
+}
+
 std::array<glm::dvec3, 8> grid_corners(const VoxelGrid& grid, Interpolation interpolation) {
     const Range r = support_of(grid, interpolation);
     std::array<glm::dvec3, 8> corners;
@@ -304,8 +358,11 @@ std::array<glm::dvec3, 8> grid_corners(const VoxelGrid& grid, Interpolation inte
     return corners;
 }
 
-GridTraits pack_grids(const Scene& scene, int bounds, DeviceScene& out) {
+GridTraits pack_grids(const Scene& scene, DeviceScene& out) {
     GridTraits traits;
+    const RenderSettings& r = scene.render;
+    const bool ratio = out.transmittance == "ratio" || out.transmittance == "residual-ratio";
+    traits.nulls = out.strategy == "delta" || out.strategy == "progressive" || ratio;
     if (scene.grids.size() > 512) throw SceneError(fmt::format("{}: more than 512 voxel media", scene.path));
     std::vector<Layout> layouts;
     const double per_length = 1 / out.normalization.scale;
@@ -318,7 +375,16 @@ GridTraits pack_grids(const Scene& scene, int bounds, DeviceScene& out) {
         traits.levels = std::max(traits.levels, levels_of(l));
         traits.kinds |= l.interpolation == Interpolation::nearest ? GRID_NEAREST : GRID_TRILINEAR;
     }
+    // Edges of the tables' cells, in bricks. Lower bounds (of residual-ratio) are the bricks' alone.
+    std::vector<int> edges(layouts.size(), 0);
+    if (traits.nulls && r.bound != "scene" && r.bound != "tree" && out.transmittance != "residual-ratio") {
+        for (std::size_t i = 0; i < scene.grids.size(); ++i) edges[i] = cheapest_edge(layouts[i], out.normalization.scale);
+        traits.tables = r.bound == "grid" || r.majorant_grid || std::any_of(edges.begin(), edges.end(), [](int e) { return e > 1; });
+    }
     for (std::size_t i = 0; i < layouts.size(); ++i) {
+        const glm::dvec3 size = layouts[i].support.hi - layouts[i].support.lo;
+        const double along = std::max({size.x, size.y, size.z}) / (kBrick * std::max(1, edges[i]));
+        const int bounds = !traits.tables ? 0 : r.majorant_grid.value_or(static_cast<int>(std::ceil(along)));
         add_grid(layouts[i], traits.levels, i < scene.grids.size() ? bounds : 0, out);
         if (!layouts[i].stored.empty()) out.grid_boxes.push_back(stored_corners(layouts[i]));
     }

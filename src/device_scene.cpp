@@ -332,7 +332,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     out.transmittance = r.transmittance != "auto" ? r.transmittance : "analytic";
     if (out.strategy != "delta" && out.strategy != "decomposition" && out.strategy != "march")
         throw RenderError(fmt::format("{}: strategy {} is not there yet", scene.path, out.strategy));
-    if (out.transmittance != "analytic") throw RenderError(fmt::format("{}: transmittance {} is not there yet", scene.path, out.transmittance));
+    if (out.transmittance != "analytic" && !scene.media.empty()) throw RenderError(fmt::format("{}: transmittance {} is not there yet", scene.path, out.transmittance));
 
     const auto start = std::chrono::steady_clock::now();
     out.ellipsoids = make_ellipsoids(scene, out.normalization);
@@ -361,9 +361,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
         pack_bvh(tree, out, stack);
         accelerator += fmt::format("{}8-wide bvh, {} nodes, {} groups", accelerator.empty() ? "" : "; ", out.nodes.size(), out.group_medium.size());
     }
-    // A bound of its own table is asked for; else null collisions know the bricks' (CLUME_SCENE_BOUND: the grid's).
-    const bool own_bounds = (out.strategy == "delta" || out.strategy == "progressive") && (r.bound == "grid" || (r.bound == "auto" && r.majorant_grid));
-    const GridTraits voxels = pack_grids(scene, own_bounds ? r.majorant_grid.value_or(64) : 0, out);
+    const GridTraits voxels = pack_grids(scene, out);
     out.accelerator_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
     const double brightest = std::max({lights.brightest, traits.brightest, voxels.brightest});
@@ -375,7 +373,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     p.light_count = static_cast<device::uint>(out.lights.size());
     p.max_depth = r.max_depth;
     p.rr_depth = r.rr_depth;
-    if (out.strategy == "march") {
+    if (out.strategy == "march" || out.transmittance == "march") {
         double step = r.step.value_or(0);
         if (!r.step) {
             step = out.normalization.radius;
@@ -415,14 +413,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     define("CLUME_ACCEL", bvh ? 2 : 1);
     define("CLUME_COUNT", options.count_work);
     define("CLUME_MIXTURE", !out.ellipsoids.empty() || scene.grids.empty());
-    if (!scene.grids.empty()) {
-        define("CLUME_GRIDS", static_cast<long long>(scene.grids.size()));
-        define("CLUME_GRID_LEVELS", voxels.levels);
-        define("CLUME_GRID_KINDS", voxels.kinds);
-        define("CLUME_GRID_BOUNDS", own_bounds);
-        define("CLUME_GRID_EMISSION", voxels.emission_grids);
-        define("CLUME_SCENE_BOUND", r.bound == "scene");
-    }
+    define_grids(scene, voxels, out);
     if (bvh) define("CLUME_BVH_STACK", stack);
     if (!out.cells.empty()) define("CLUME_CELL_LEVELS", out.params.cells_levels);
 
@@ -442,13 +433,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     say("lights found by paths", names(lights.hits, kinds));
     say("opaque surfaces", lights.present & (LIGHT_SPHERE | LIGHT_RECTANGLE) ? "tested on every ray" : "left out");
     say("visible background", lights.visible_background ? "yes" : "left out");
-    if (!scene.grids.empty()) {
-        const bool nulls = out.strategy == "delta" || out.strategy == "progressive";
-        say("voxel media", fmt::format("{}: {} bricks of 8x8x8, {} octree levels, flights by {}", scene.grids.size(), voxels.bricks, voxels.levels,
-                                       nulls ? r.bound == "scene" ? "null collisions under one bound for each grid" : own_bounds ? "null collisions under a table of bounds" : "null collisions under the bricks' bounds"
-                                       : out.strategy == "march" ? "marching" : "exact walks from voxel to voxel"));
-        say("emission grids", voxels.emission_grids ? "integrated along every flight" : "left out");
-    }
+    explain_grids(scene, voxels, out);
     say("colour", grey ? "one channel: everything is grey" : "RGB");
     say("depth limit", r.max_depth >= 0 ? std::to_string(r.max_depth) : "left out");
     return out;

@@ -107,6 +107,8 @@ ProbeRun<ProbeGrid> Probe::grid(std::span<const ProbeRay> rays, std::uint32_t g)
     return result;
 }
 
+ProbeRun<ProbeHit> Probe::estimated_transmittances(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 8); }
+
 std::vector<ProbeRay> Probe::camera_rays(std::span<const std::uint32_t> pixels, std::uint32_t sample) {
     Impl& s = *impl_;
     Buffer<device::uint> in(s.queue, pixels);

@@ -88,6 +88,8 @@ public:
     /// Exact transmittances up to t_end.
     ProbeRun<ProbeHit> transmittances(std::span<const ProbeRay> rays);
     /// The renderer's estimates: exact up to a depth, by roulette beyond.
+    /// Transmittances up to t_end by the program's estimator.
+    ProbeRun<ProbeHit> estimated_transmittances(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
     ProbeRun<ProbeHit> roulette_transmittances(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
     /// Every ray against grid g of the scene alone, which has one.
     ProbeRun<ProbeGrid> grid(std::span<const ProbeRay> rays, std::uint32_t g = 0);

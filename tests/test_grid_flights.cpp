@@ -57,7 +57,7 @@ struct Law {
     std::size_t bin(double t) const { return static_cast<std::size_t>(std::clamp((t - t0) / (t1 - t0) * bins, 0.0, static_cast<double>(bins - 1))); }
 };
 
-double flight_p(Probe& probe, const Scene& scene, const DeviceScene& device, const ProbeRay& r, std::size_t count, std::uint32_t sample) {
+double flight_p(Probe& probe, const Scene& scene, const DeviceScene& device, const ProbeRay& r, std::size_t count, std::uint32_t sample, double slack = 1e-5) {
     Law law(scene, device, r);
     std::vector<double> observed(law.expected.size());
     for (const ProbeHit& hit : probe.flights(std::vector<ProbeRay>(count, r), sample).values) {
@@ -66,7 +66,7 @@ double flight_p(Probe& probe, const Scene& scene, const DeviceScene& device, con
             continue;
         }
         const double t = static_cast<double>(hit.t);
-        if (t < law.t0 * (1 - 1e-5) - 1e-5 || t > law.t1 * (1 + 1e-5)) return 0;
+        if (t < law.t0 - slack * (1 + law.t0) || t > law.t1 + slack * (1 + law.t1)) return 0;
         // Without per-primitive look-ups a mixture's flight need not say whose its collision was.
         const std::size_t n = device.ellipsoids.size(), medium = hit.primitive < n || hit.primitive == CLUME_NO_PRIMITIVE ? 0 : hit.primitive - n + 1;
         if (medium >= law.media) return 0;
@@ -127,6 +127,109 @@ TEST_CASE("GridFlights.FollowTheGrid", "[kernels]") {
             std::uint32_t sample = 0;
             for (const ProbeRay& r : kRays) tests.add(fmt::format("{} by {}, ray {}", name, way.name(), sample), flight_p(probe, here, device, r, 40000, sample)), ++sample;
         }
+}
+
+TEST_CASE("GridFlights.MarchIsBiasedByItsStep", "[kernels]") {
+    Scene scene = scenes()[0].second;
+    scene.render.strategy = "march";
+    std::vector<double> p;
+    for (const double step : {0.3, 0.001}) {
+        scene.render.step = step;
+        const DeviceScene device = make_device_scene(scene, {});
+        Probe probe(test_device(), device);
+        p.push_back(flight_p(probe, scene, device, kRays[0], 40000, 5, step));
+    }
+    INFO("p " << p[0] << " with a coarse step, " << p[1] << " with a fine one");
+    CHECK(p[0] < 1e-9);
+    CHECK(p[1] > 1e-4);
+}
+
+TEST_CASE("GridTransmittance.EveryEstimatorHasTheMean", "[kernels]") {
+    // exp(−∫ σ dt) over two grids: exactly, or on average with the estimator's own spread.
+    struct Estimator {
+        const char *name, *strategy, *bound;
+        int majorant_grid;
+    };
+    const Estimator estimators[] = {{"analytic", "delta", "tree", 0}, {"ratio", "delta", "tree", 0}, {"ratio", "delta", "scene", 0}, {"ratio", "decomposition", "grid", 12},
+                                    {"residual-ratio", "delta", "tree", 0}, {"residual-ratio", "delta", "scene", 0}, {"binary", "delta", "tree", 0}, {"binary", "decomposition", "tree", 0}};
+    std::vector<std::pair<std::string, double>> all;
+    for (const double density : {0.6, 4.0}) {
+        Scene scene = scenes()[0].second;
+        scene.grids.push_back(scenes()[3].second.grids[0]);
+        // Never 0: there is something to take out.
+        scene.grids[0].density = voxel_grid({0, 0, 0}, {20, 21, 19}, [](const glm::ivec3& p) { return 0.5 + random_samples(1)(p); }, false, glm::dmat3(0.1), glm::dvec3(-0.95, -1, -0.9));
+        for (auto& m : scene.grids) m.density_scale *= 0.2 * density;
+        for (const Estimator& e : estimators) {
+            Scene here = scene;
+            here.render.strategy = e.strategy;
+            here.render.transmittance = e.name;
+            here.render.bound = e.bound;
+            if (e.majorant_grid) here.render.majorant_grid = e.majorant_grid;
+            const DeviceScene device = make_device_scene(here, {});
+            Probe probe(test_device(), device);
+            std::uint32_t sample = 0;
+            for (const ProbeRay& r : kRays) {
+                const WorldRay w(r, device.normalization);
+                double depth = 0;
+                for (const GridMedium& m : here.grids) depth += host_density(m).integral(w.origin, w.direction, 0, w.t_end);
+                constexpr std::size_t count = 20000;
+                double sum = 0, square = 0;
+                for (const ProbeHit& h : probe.estimated_transmittances(std::vector<ProbeRay>(count, r), sample++).values) {
+                    const double t = static_cast<double>(h.transmittance);
+                    CHECK((t >= 0 && t <= 1));
+                    sum += t;
+                    square += t * t;
+                }
+                const double mean = sum / count, expected = std::exp(-depth);
+                // What the sample's own spread can't show where few estimates are above 0: all of them 0.1 or more.
+                const double deviation = std::sqrt(std::max({square / count - mean * mean, 0.0, std::string(e.name) == "analytic" && depth < 2 ? 0.0 : 0.1 * std::min(expected, 0.02)}) / count) + 1e-6 * (1 + depth) * expected;
+                all.emplace_back(fmt::format("{} by {} {}, ray {}: {} of {}", e.name, e.strategy, e.bound, sample - 1, mean, expected), reference::z_test_p((mean - expected) / deviation));
+            }
+        }
+    }
+    const double threshold = reference::sidak_threshold(1e-4, all.size());
+    for (const auto& [what, p] : all) {
+        INFO(what);
+        CHECK(p > threshold);
+    }
+}
+
+TEST_CASE("GridTransmittance.ResidualRatioKnowsConstants", "[kernels]") {
+    // A box of one density has no residual: the estimate is exact, without a random number.
+    Scene scene = grid_scene(grid_medium(voxel_grid({0, 0, 0}, {24, 24, 24}, [](auto) { return 1.0; }, false, glm::dmat3(0.08)), 0.7));
+    scene.render.transmittance = "residual-ratio";
+    const DeviceScene device = make_device_scene(scene, {});
+    const auto rays = random_rays(400, 5);
+    const auto got = Probe(test_device(), device).estimated_transmittances(rays).values;
+    const HostGrid host = host_density(scene.grids[0]);
+    std::size_t hit = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const WorldRay w(rays[i], device.normalization);
+        const double depth = host.integral(w.origin, w.direction, 0, w.t_end);
+        hit += depth > 0;
+        CHECK(static_cast<double>(got[i].transmittance) == Approx(std::exp(-depth)).epsilon(1e-5));
+    }
+    CHECK(hit > 200);
+}
+
+TEST_CASE("GridTransmittance.MarchConverges", "[kernels]") {
+    Scene scene = scenes()[2].second;
+    scene.render.transmittance = "march";
+    double error[2] = {0, 0};
+    for (const int fine : {0, 1}) {
+        scene.render.step = fine ? 0.004 : 0.2;
+        const DeviceScene device = make_device_scene(scene, {});
+        const HostGrid host = host_density(scene.grids[0]);
+        const auto rays = random_rays(400, 5);
+        const auto got = Probe(test_device(), device).estimated_transmittances(rays).values;
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            const WorldRay w(rays[i], device.normalization);
+            error[fine] = std::max(error[fine], std::abs(static_cast<double>(got[i].transmittance) - std::exp(-host.integral(w.origin, w.direction, 0, w.t_end))));
+        }
+    }
+    INFO(error[0] << " " << error[1]);
+    CHECK(error[0] > 0.01);
+    CHECK(error[1] < 0.01);
 }
 
 TEST_CASE("GridFlights.CompeteWithAMixture", "[kernels]") {

@@ -192,3 +192,124 @@ TEST_CASE("Grids.InverseComesBack", "[kernels]") {
             report(fmt::format("{} by {}: depth at the inverse off by {:.2g} of it, {} reached", c.name, how, worst, reached));
         }
 }
+
+TEST_CASE("Grids.BoundsHold", "[kernels]") {
+    // Over every brick and every cell of a table of bounds: the density at many points, the corners' among them, lies between
+    // the two; and an upper bound is no higher than it must be.
+    for (const Case& c : cases()) {
+        Scene scene = c.scene;
+        const GridMedium& m = scene.grids[0];
+        const HostGrid host = host_density(m);
+        scene.render.bound = "grid";
+        scene.render.majorant_grid = 7;
+        const DeviceScene device = make_device_scene(scene, {});
+        const device::GridInfo& info = device.grids[0];
+        const double scale = device.normalization.scale, per_root = 8;
+        CHECK(static_cast<double>(info.bound) * scale >= host.largest());
+        CHECK(static_cast<double>(info.bound) * scale < host.largest() * (1 + 1e-5));
+        TestRandom random(9);
+        // Table to lattice: the support's lower corner is at `lower` in both.
+        const glm::dvec3 corner(info.lower.x, info.lower.y, info.lower.z);
+        const auto check = [&](const device::CellEntry& entry, const glm::dvec3& lo, double size) {
+            const bool empty = entry.link < CELL_EMPTY_MAX;
+            const double most = empty ? 0 : static_cast<double>(entry.majorant) * scale, least = empty ? 0 : static_cast<double>(from_bits(entry.reference)) * scale;
+            for (int k = 0; k < 40; ++k) {
+                glm::dvec3 u(random.uniform(), random.uniform(), random.uniform());
+                if (k % 2 && m.interpolation == kTrilinear) u = glm::round(u * 8.0) / 8.0;
+                const glm::dvec3 p = host.lower() + ((lo + size * u) - corner) * per_root;
+                const double v = host.at_lattice(p);
+                const bool inside = glm::all(glm::greaterThan(p, host.lower())) && glm::all(glm::lessThan(p, host.upper()));
+                if (!(v <= most * (1 + 1e-6)) || (inside && v < least * (1 - 1e-6))) FAIL(c.name << ": " << v << " outside " << least << " to " << most);
+            }
+        };
+        std::size_t full = 0;
+        for (std::uint32_t z = 0; z < info.roots_z; ++z)
+            for (std::uint32_t y = 0; y < info.roots_y; ++y)
+                for (std::uint32_t x = 0; x < info.roots_x; ++x) {
+                    const device::CellEntry& e = device.grid_cells[info.first_entry + x + info.roots_x * (y + static_cast<std::size_t>(info.roots_y) * z)];
+                    full += e.link >= CELL_EMPTY_MAX;
+                    check(e, glm::dvec3(x, y, z), 1);
+                    if (e.link < CELL_EMPTY_MAX) continue;
+                    // The least and the largest of the brick's own samples, which the density takes on at lattice points.
+                    const int n = m.interpolation == kNearest ? 8 : 9;
+                    float lowest = 1e30f, highest = 0;
+                    for (int i = 0; i < n * n * n; ++i) {
+                        const float v = device.grid_values[729 * (info.first_brick + e.link - CELL_EMPTY_MAX) + static_cast<std::size_t>(i % n + 9 * (i / n % n) + 81 * (i / n / n))];
+                        lowest = std::min(lowest, v);
+                        highest = std::max(highest, v);
+                    }
+                    CHECK(from_bits(e.reference) == lowest);
+                    CHECK(e.majorant >= highest);
+                    CHECK(e.majorant <= highest * 1.000002f);
+                    CHECK((e.count == 1) == (lowest == highest));
+                }
+        CHECK(full > 0);
+        const double size = 1 / static_cast<double>(info.bounds_scale);
+        for (std::uint32_t i = 0; i < info.bounds_x * info.bounds_y * info.bounds_z; ++i)
+            check(device.grid_cells[info.first_bound + i], corner + size * glm::dvec3(i % info.bounds_x, i / info.bounds_x % info.bounds_y, i / info.bounds_x / info.bounds_y), size);
+    }
+}
+
+TEST_CASE("Grids.DenseAndSparseAgree", "[kernels]") {
+    // The same samples, the outermost 0, with tables that begin at the same lattice point: the same bits. A layer more of
+    // zeros about the sparse one moves its table: the same but for rounding.
+    const auto f = [](const glm::ivec3& p) { return p.x <= 1 || p.y <= 1 || p.z <= 1 || p.x >= 24 || p.y >= 22 || p.z >= 27 ? 0.0 : random_samples(6)(p); };
+    for (const Interpolation i : {kTrilinear, kNearest}) {
+        const glm::ivec3 lo(i == kNearest ? 0 : 1);
+        Scene dense = grid_scene(grid_medium(voxel_grid(lo, {26, 24, 29}, f, false, glm::dmat3(0.1)), 2, i)), sparse = dense, moved = dense;
+        // A light keeps the scenes' sizes, and so their normalisation, alike.
+        Light ball;
+        ball.kind = LightKind::sphere;
+        ball.center = {1.3, 1.2, 1.4};
+        ball.radius = 40;
+        for (Scene* s : {&dense, &sparse, &moved}) s->lights = {ball};
+        sparse.grids[0].density = voxel_grid(lo, {26, 24, 29}, f, true, glm::dmat3(0.1));
+        moved.grids[0].density = voxel_grid({-5, -4, -3}, {30, 30, 31}, f, true, glm::dmat3(0.1));
+        const DeviceScene device = make_device_scene(dense, {});
+        auto rays = rays_through(dense, device, 1000, 10);
+        for (ProbeRay& r : rays) r.t_end = 4;
+        const auto a = Probe(test_device(), device).grid(rays).values, b = Probe(test_device(), make_device_scene(sparse, {})).grid(rays).values, c = Probe(test_device(), make_device_scene(moved, {})).grid(rays).values;
+        const HostGrid host = host_density(dense.grids[0]);
+        std::size_t differing = 0;
+        for (std::size_t k = 0; k < rays.size(); ++k) {
+            differing += bits(a[k].depth) != bits(b[k].depth) || bits(a[k].t) != bits(b[k].t);
+            if (i == kNearest && (k % 8 == 3 || k % 8 == 5)) continue;
+            CHECK(std::abs(static_cast<double>(a[k].depth - c[k].depth)) <= 2 * allowed(host, WorldRay(rays[k], device.normalization), static_cast<double>(a[k].depth), i));
+        }
+        INFO((i == kNearest ? "nearest" : "trilinear"));
+        if (i == kNearest) CHECK(differing == 0);
+        CHECK(differing < rays.size());
+    }
+}
+
+TEST_CASE("Grids.LevelsChangeNothing", "[kernels]") {
+    // A table too large for roots alone is an octree: the same density, depth and inverse along every ray.
+    const auto f = [](const glm::ivec3& p) { return (p.x / 40 + p.y / 40 + p.z / 40) % 5 == 0 && p.x % 40 < 9 && p.y % 40 < 9 && p.z % 40 < 9 ? 0.2 + random_samples(3)(p) : 0.0; };
+    Scene scene = grid_scene(grid_medium(voxel_grid({0, 0, 0}, {160, 120, 120}, f, true, glm::dmat3(0.01)), 20));
+    const HostGrid host = host_density(scene.grids[0]);
+    // Far corners make the lattice 1,400 samples wide: 176³ bricks.
+    VoxelGrid wide = scene.grids[0].density;
+    wide.hi = {1400, 1400, 1400};
+    Scene deep = scene;
+    deep.grids[0].density = wide;
+    const DeviceScene device = make_device_scene(deep, {});
+    const std::string levels = [&] {
+        for (const auto& [name, value] : device.defines)
+            if (name == "CLUME_GRID_LEVELS") return value;
+        return std::string();
+    }();
+    CHECK(levels == "1");
+    Probe probe(test_device(), device);
+    const auto rays = rays_through(scene, device, 1000, 11);
+    const auto got = probe.grid(rays).values;
+    std::size_t hit = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const WorldRay w(rays[i], device.normalization);
+        const double expected = host.integral(w.origin, w.direction, 0, w.t_end);
+        hit += expected > 0;
+        INFO("ray " << i << ": " << got[i].depth << " of " << expected);
+        // Positions are rounded to 2^-20 of the wide table.
+        CHECK(std::abs(static_cast<double>(got[i].depth) - expected) <= 12 * allowed(host, w, expected, kTrilinear));
+    }
+    CHECK(hit > 300);
+}
