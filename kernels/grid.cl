@@ -188,17 +188,18 @@ static float brick_invert(const BrickWalk* b, bool nearest, float target, float 
             COUNT(work, WORK_ROOTS, 1);
             const float excess = fma(s, fma(s, fma(s, fma(s, 0.25f * c3, 0.333333333f * c2), 0.5f * c1), uuu), -level);
             if (fabs(excess) <= tolerance) break;
-            const float width = hi - lo;
+#if !CLUME_BISECTION
+            const float half_width = 0.5f * (hi - lo);
+#endif
             lo = excess > 0.0f ? lo : s;
             hi = excess > 0.0f ? s : hi;
-            const float middle = 0.5f * (lo + hi);
 #if CLUME_BISECTION
-            s = middle;
+            s = 0.5f * (lo + hi);
 #else
             const float slope = fma(s, fma(s, fma(s, c3, c2), c1), uuu);
             const float newton = s - excess * rcp_s(max_s(slope, 0x1p-90f));
             // A step that leaves the bracket, or one that shrinks too slowly: halve it instead.
-            s = newton > lo && newton < hi && (i < 3 || hi - lo < 0.5f * width) ? newton : middle;
+            s = newton > lo && newton < hi && (i < 3 || hi - lo < half_width) ? newton : 0.5f * (lo + hi);
 #endif
         }
     }

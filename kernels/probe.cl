@@ -87,7 +87,7 @@ __kernel void probe_group_work(__global const float* groups, __global const floa
 }
 
 /// Ray i, two float4: origin with t_end, direction. Free flight by the program's strategy up to t_end: out t
-/// (CLUME_INFINITY if it escapes), primitive (as_uint), transmittance to t_end, groups and single primitives evaluated (as_uint; 0 unless counted). what: 1 flight, 2 transmittance, 4 transmittance
+/// (CLUME_INFINITY if it escapes), primitive (as_uint), transmittance to t_end, groups, single primitives and voxels evaluated (as_uint; 0 unless counted). what: 1 flight, 2 transmittance, 4 transmittance
 /// by roulette past CLUME_EXACT_DEPTH, 8 transmittance by the program's estimator.
 __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4* out, uint count, uint sample, uint what) {
     const uint i = (uint)get_global_id(0);
@@ -116,7 +116,7 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
     if (what & 8u) r.z = transmittance_estimate(o, d, t_end, draw_bits(&draws, 1).x, &draws, &f, SCENE);
     if (what & 6u) r.z = transmittance_analytic(o, d, t_end, transmittance_limit(roulette), &f.work, SCENE);
 #if CLUME_COUNT
-    r.w = as_float((uint)(f.work.n[WORK_GROUPS] + f.work.n[WORK_PRIMITIVES]));
+    r.w = as_float((uint)(f.work.n[WORK_GROUPS] + f.work.n[WORK_PRIMITIVES] + f.work.n[WORK_VOXELS]));
 #endif
     out[i] = r;
 }

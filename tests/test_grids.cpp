@@ -251,8 +251,8 @@ TEST_CASE("Grids.BoundsHold", "[kernels]") {
 }
 
 TEST_CASE("Grids.DenseAndSparseAgree", "[kernels]") {
-    // The same samples, the outermost 0, with tables that begin at the same lattice point: the same bits. A layer more of
-    // zeros about the sparse one moves its table: the same but for rounding.
+    // The same samples, the outermost 0, in tables that begin at the same lattice point: nearest, the same bits; trilinear, and
+    // with more zeros about the sparse one, which moves its table: the same but for rounding.
     const auto f = [](const glm::ivec3& p) { return p.x <= 1 || p.y <= 1 || p.z <= 1 || p.x >= 24 || p.y >= 22 || p.z >= 27 ? 0.0 : random_samples(6)(p); };
     for (const Interpolation i : {kTrilinear, kNearest}) {
         const glm::ivec3 lo(i == kNearest ? 0 : 1);
@@ -274,11 +274,12 @@ TEST_CASE("Grids.DenseAndSparseAgree", "[kernels]") {
         for (std::size_t k = 0; k < rays.size(); ++k) {
             differing += bits(a[k].depth) != bits(b[k].depth) || bits(a[k].t) != bits(b[k].t);
             if (i == kNearest && (k % 8 == 3 || k % 8 == 5)) continue;
-            CHECK(std::abs(static_cast<double>(a[k].depth - c[k].depth)) <= 2 * allowed(host, WorldRay(rays[k], device.normalization), static_cast<double>(a[k].depth), i));
+            const double slack = 2 * allowed(host, WorldRay(rays[k], device.normalization), static_cast<double>(a[k].depth), i);
+            CHECK(std::abs(static_cast<double>(a[k].depth - b[k].depth)) <= slack);
+            CHECK(std::abs(static_cast<double>(a[k].depth - c[k].depth)) <= slack);
         }
-        INFO((i == kNearest ? "nearest" : "trilinear"));
+        // Supports of trilinear grids differ by half a voxel, and with them the point that positions are relative to.
         if (i == kNearest) CHECK(differing == 0);
-        CHECK(differing < rays.size());
     }
 }
 
