@@ -108,14 +108,15 @@ static float grid_value(__global const GridInfo* grid, float4 q, __global const 
 /// cell ends exactly where the brick does.
 typedef struct {
     float4 origin, direction;  // in cells
+    float4 inverse, offset;    // t of the plane at cell p: fma(p, inverse, offset), as the table's walk has it
     float4 base, plane;        // present cell's lower corner, its far planes
     float4 t_plane;
     float t, t_next, t_end;    // present segment, end of the way
     __global const float* p;   // the cell's first sample
 } BrickWalk;
 
-static void brick_segment(BrickWalk* b, const CellWalk* w) {
-    b->t_plane = fma(b->plane * (1.0f / GRID_CELLS), w->inverse, w->offset);
+static void brick_segment(BrickWalk* b) {
+    b->t_plane = fma(b->plane, b->inverse, b->offset);
     b->t_next = max_s(b->t, min_s(b->t_end, min_s(b->t_plane.x, min_s(b->t_plane.y, b->t_plane.z))));
 }
 
@@ -123,6 +124,8 @@ static void brick_segment(BrickWalk* b, const CellWalk* w) {
 static void brick_enter(BrickWalk* b, const CellWalk* w, __global const float* brick, float t_end) {
     b->origin = w->origin * GRID_CELLS;
     b->direction = w->direction * GRID_CELLS;
+    b->inverse = w->inverse * (1.0f / GRID_CELLS);
+    b->offset = w->offset;
     b->t = w->t;
     b->t_end = t_end;
     const float4 corner = grid_base(w), place = fma((float4)w->t, b->direction, b->origin) - corner, last = (float4)(GRID_BRICK - 1.0f);
@@ -131,7 +134,7 @@ static void brick_enter(BrickWalk* b, const CellWalk* w, __global const float* b
     b->p = brick + at.x + GRID_ROW * at.y + GRID_SLICE * at.z;
     b->base = corner + (float4)((float)at.x, (float)at.y, (float)at.z, 0.0f);
     b->plane = b->base + select((float4)0.0f, (float4)1.0f, w->step > (float4)0.0f);
-    brick_segment(b, w);
+    brick_segment(b);
 }
 
 /// Steps to the next cell; false at the end of the way.
@@ -139,20 +142,20 @@ static bool brick_next(BrickWalk* b, const CellWalk* w) {
     if (!(b->t_next < b->t_end)) return false;
     b->t = b->t_next;
     const int4 crossed = b->t_plane <= (float4)b->t_next;
-    const int4 forward = w->step > (float4)0.0f;
-    const int4 stride = select((int4)(-1, -GRID_ROW, -GRID_SLICE, 0), (int4)(1, GRID_ROW, GRID_SLICE, 0), forward) & crossed;
-    const float4 move = select((float4)0.0f, w->step, crossed);
+    const int4 stride = convert_int4_rtz(w->step) * (int4)(1, GRID_ROW, GRID_SLICE, 0) & crossed;
+    const float4 move = crossed ? w->step : (float4)0.0f;
     b->p += stride.x + stride.y + stride.z;
     b->base += move;
     b->plane += move;
-    brick_segment(b, w);
+    brick_segment(b);
     return true;
 }
 
 /// Position at t within the present cell, kept in [0, 1].
 static float4 brick_local(const BrickWalk* b, float t) {
     const float4 u = fma((float4)t, b->direction, b->origin) - b->base, zero = (float4)0.0f, one = (float4)1.0f;
-    return select(select(u, zero, u < zero), one, u > one);
+    const float4 v = u < zero ? zero : u;
+    return v > one ? one : v;
 }
 
 /// Integral over the present segment; relative error of the quadrature's sum < 1e-6.
