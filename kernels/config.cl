@@ -80,6 +80,18 @@
 #ifndef CLUME_GRIDS  // voxel media in the scene
 #define CLUME_GRIDS 0
 #endif
+#ifndef CLUME_GRID_LEVELS  // octree levels of the grids' tables of bricks below their roots
+#define CLUME_GRID_LEVELS 0
+#endif
+#ifndef CLUME_GRID_KINDS  // interpolations of the grids, GRID_* bits
+#define CLUME_GRID_KINDS (GRID_TRILINEAR | GRID_NEAREST)
+#endif
+#ifndef CLUME_GRID_BOUNDS  // 1: null collisions in grids know bounds from a table of its own; 0: those of the bricks
+#define CLUME_GRID_BOUNDS 0
+#endif
+#ifndef CLUME_GRID_EMISSION  // 1: some voxel medium has an emission grid
+#define CLUME_GRID_EMISSION 0
+#endif
 #define ACCEL_CELLS 1
 #define ACCEL_BVH 2
 #ifndef CLUME_ACCEL

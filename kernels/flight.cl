@@ -5,17 +5,32 @@
 #include "strategy_march.cl"
 #include "strategy_regular.cl"
 #include "transmittance.cl"
+#include "grid_flight.cl"
 
 #if CLUME_STRATEGY == STRATEGY_DELTA
-#define flight_sample flight_delta
+#define mixture_flight flight_delta
 #elif CLUME_STRATEGY == STRATEGY_PROGRESSIVE
-#define flight_sample flight_progressive
+#define mixture_flight flight_progressive
 #elif CLUME_STRATEGY == STRATEGY_MARCH
-#define flight_sample flight_march
+#define mixture_flight flight_march
 #elif CLUME_STRATEGY == STRATEGY_REGULAR || CLUME_STRATEGY == STRATEGY_REGULAR_LINEAR
-#define flight_sample flight_regular
+#define mixture_flight flight_regular
 #elif CLUME_STRATEGY == STRATEGY_MARCH_ANALYTIC
-#define flight_sample flight_march_analytic
+#define mixture_flight flight_march_analytic
 #else
-#define flight_sample flight_decomposition
+#define mixture_flight flight_decomposition
 #endif
+
+/// The next collision before t_end: the mixture's flight and every grid's, the nearest of all. Only the mixture's may pause;
+/// grids then fly when it is over.
+static int flight_sample(float3 o, float3 d, float t_end, Flight* f, const Draws* r, SCENE_ARGS) {
+#if CLUME_MIXTURE
+    int result = mixture_flight(o, d, t_end, f, r, SCENE);
+#else
+    int result = FLIGHT_ESCAPED;
+#endif
+#if CLUME_GRIDS
+    if (result != FLIGHT_PAUSED) result = grids_fly(result, o, d, t_end, f, r, SCENE);
+#endif
+    return result;
+}

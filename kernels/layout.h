@@ -9,8 +9,8 @@
 //   cells    CellEntry               root cells, x fastest, then blocks of 8 children
 //   leaves   CellLeaf                per non-empty cell
 //   references Reference             per (cell, primitive): an alias table over the cell's bounds, for null collisions
-//   learned  float                   per non-empty cell: the bound that `progressive` uses in this pass
-//   raised   uint                    per non-empty cell: bits of the highest density above it that was found
+//   learned  float                   per non-empty cell, then per brick: the bound that `progressive` uses in this pass
+//   raised   uint                    likewise: bits of the highest density above it that was found
 //   primitives Primitive             per primitive, one cache line
 //   nodes    BvhNode                 8-wide bounding volume hierarchy; leaves are groups
 //   media    MediumInfo              per medium
@@ -18,6 +18,9 @@
 //   lights   LightInfo               per light
 //   texels   float4                  environment images: radiance, unused
 //   alias    AliasEntry              one per texel, importance sampling
+//   grids    GridInfo                per voxel medium, then per emission grid
+//   grid_cells CellEntry             per grid: its table of bricks (roots, then blocks of 8 children), its bounds' own table
+//   grid_values float[729]           per brick: 9 × 9 × 9 samples, x fastest
 //   pixels   uint                    film index (x + width * y) of each pixel that the batch renders
 //   states   PathState               per work-item, kept between launches
 //   sums     ulong[FILM_WORDS]       per work-item, 128-bit fixed point (film.cl)
@@ -48,6 +51,18 @@ struct alignas(16) float4 {
 // all is empty; with CELL_INNER set, the index of a block of 8 children; else CELL_EMPTY_MAX + the leaf's index.
 #define CELL_EMPTY_MAX 64u
 #define CELL_INNER 0x80000000u
+
+// A brick of a voxel grid: 8 × 8 × 8 cells. A cell of a trilinear grid lies between 8 lattice points, so the brick stores 9
+// samples along each axis; a cell of a nearest grid is a voxel (the ninth samples are there, unused). In a table of bricks a
+// leaf's CellEntry has the bounds of σ_t per normalised length over the brick: majorant, and the lower one as a float's bits
+// in `reference`; count is 1 where the density is the same all over.
+#define GRID_BRICK 8
+#define GRID_ROW 9
+#define GRID_SLICE 81
+#define GRID_BRICK_VALUES 729
+#define GRID_TRILINEAR 1u
+#define GRID_NEAREST 2u
+#define GRID_NONE 0xffffffffu
 
 #define FAMILY_GAUSSIAN 1u
 #define FAMILY_EPANECHNIKOV 2u
@@ -146,6 +161,23 @@ typedef struct MediumInfo {
     float extent_squared, g;
 } MediumInfo;
 
+// Positions in a grid are in root cells of its table: (to_x · q + to_x.w, …) with q = p − center, p normalised.
+typedef struct GridInfo {
+    float4 center;
+    float4 to_x, to_y, to_z;
+    float4 lower, upper;  // support: beyond it the density is 0
+    float4 emission;      // factor of its emission grid's values
+    uint roots_x, roots_y, roots_z, first_entry;
+    uint first_brick, interpolation;
+    uint primitive;      // that a collision reports: the number of ellipsoids + the medium's index
+    uint emission_grid;  // index into grids, or GRID_NONE
+    uint bounds_x, bounds_y, bounds_z, first_bound;  // a table of bounds of its own (no levels), from `lower` on
+    float bounds_scale;                              // its cells per root cell
+    float bound;                                     // of all the grid
+    uint first_learned;  // bounds of `progressive`: one per brick, or (CLUME_SCENE_BOUND) one
+    float pad0;
+} GridInfo;
+
 typedef struct LightInfo {
     uint kind, visible, width, height;  // visible: to the camera
     uint texel_offset, pad0, pad1;
@@ -172,7 +204,7 @@ typedef struct PathState {
 
 #ifdef __cplusplus
 static_assert(sizeof(RenderParams) == 240 && sizeof(CellEntry) == 16 && sizeof(CellLeaf) == 16 && sizeof(Reference) == 16 && sizeof(Primitive) == 64 && sizeof(BvhNode) == 224 && sizeof(MediumInfo) == 16);
-static_assert(sizeof(LightInfo) == 144 && sizeof(AliasEntry) == 16 && sizeof(PathState) == 80);
+static_assert(sizeof(LightInfo) == 144 && sizeof(AliasEntry) == 16 && sizeof(GridInfo) == 176 && sizeof(PathState) == 80);
 }  // namespace clume::device
 #endif
 

@@ -8,8 +8,9 @@
         __global const Reference *references, __global const Primitive *primitives, __global const BvhNode *nodes,    \
         __global const float *groups, __global const uint *group_medium, __global const MediumInfo *media,            \
         __global const float4 *shading, __global const LightInfo *lights, __global const float4 *texels,              \
-        __global const AliasEntry *alias, __global const float *learned, __global uint *raised
-#define SCENE params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias, learned, raised
+        __global const AliasEntry *alias, __global const float *learned, __global uint *raised,                              \
+        __global const GridInfo *grids, __global const CellEntry *grid_cells, __global const float *grid_values
+#define SCENE params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias, learned, raised, grids, grid_cells, grid_values
 
 // With one medium, family and extent are constants of the program.
 #if CLUME_ONE_MEDIUM

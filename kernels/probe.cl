@@ -87,7 +87,7 @@ __kernel void probe_group_work(__global const float* groups, __global const floa
 }
 
 /// Ray i, two float4: origin with t_end, direction. Free flight by the program's strategy up to t_end: out t
-/// (CLUME_INFINITY if it escapes), primitive (as_uint), transmittance to t_end, groups and single primitives evaluated (as_uint; 0 unless counted). what: 1 flight, 2 transmittance, 4 transmittance
+/// (CLUME_INFINITY if it escapes), primitive (as_uint), transmittance to t_end, groups, single primitives and voxels evaluated (as_uint; 0 unless counted). what: 1 flight, 2 transmittance, 4 transmittance
 /// by roulette past CLUME_EXACT_DEPTH, 8 transmittance by the program's estimator.
 __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4* out, uint count, uint sample, uint what) {
     const uint i = (uint)get_global_id(0);
@@ -116,10 +116,32 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
     if (what & 8u) r.z = transmittance_estimate(o, d, t_end, draw_bits(&draws, 1).x, &draws, &f, SCENE);
     if (what & 6u) r.z = transmittance_analytic(o, d, t_end, transmittance_limit(roulette), &f.work, SCENE);
 #if CLUME_COUNT
-    r.w = as_float((uint)(f.work.n[WORK_GROUPS] + f.work.n[WORK_PRIMITIVES]));
+    r.w = as_float((uint)(f.work.n[WORK_GROUPS] + f.work.n[WORK_PRIMITIVES] + f.work.n[WORK_VOXELS]));
 #endif
     out[i] = r;
 }
+
+#if CLUME_GRIDS
+/// Ray i as in probe_ray, direction.w an optical depth tau, against grid g alone: out the depth up to t_end, where it reaches
+/// tau (CLUME_INFINITY if not), the density at along(o, d, t_end), the emission grid's integral up to t_end times emission.x.
+__kernel void probe_grid(SCENE_ARGS, __global const float4* rays, __global float4* out, uint count, uint g) {
+    const uint i = (uint)get_global_id(0);
+    if (i >= count) return;
+    const float3 o = rays[2 * i].xyz, d = rays[2 * i + 1].xyz;
+    const float t_end = rays[2 * i].w, tau = rays[2 * i + 1].w;
+    Work work;
+    work_clear(&work);
+    float4 r = (float4)0.0f, origin, direction;
+    r.x = convert_float_rte(grid_depth(g, o, d, t_end, ~(ulong)0, &work, SCENE)) * 0x1p-40f;
+    r.y = grid_invert(g, o, d, t_end, tau, &work, SCENE);
+    float begin = t_end, end = t_end + fabs(t_end) * 0x1p-20f;
+    if (grid_clip(grids + g, o, d, &origin, &direction, &begin, &end)) r.z = grid_value(grids + g, fma((float4)t_end, direction, origin), grid_cells, grid_values);
+#if CLUME_GRID_EMISSION
+    r.w = grids_emission(o, d, t_end, &work, SCENE).x;
+#endif
+    out[i] = r;
+}
+#endif
 
 /// Camera rays of pixels' samples, as probe_ray takes them.
 __kernel void probe_camera(SCENE_ARGS, __global const uint* pixels, __global float4* rays, uint count, uint sample) {

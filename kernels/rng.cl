@@ -4,7 +4,10 @@
 // compare it with Random123's. Per-primitive bits come from a keyed 32-bit mixer, one multiply-xorshift chain per vector.
 #include "math.cl"
 
-// Draw numbers: flights count up from 0; the others have their own block each.
+// Draw numbers: flights count up from 0; the others have their own block each. A grid's flight and its part in a shadow ray
+// count up from 2^20 times its index above theirs (grid_bits of grid.cl).
+#define DRAW_GRID_FLIGHT 0x80000000u
+#define DRAW_GRID_SHADOW 0xc0000000u
 #define DRAW_PHASE 0xf0000000u
 #define DRAW_LIGHT 0xf0000001u
 #define DRAW_CAMERA 0xf0000002u

@@ -24,8 +24,8 @@ static int flight_progressive(float3 o, float3 d, float t_end, Flight* f, const 
     do {
         COUNT(&f->work, WORK_CELLS, 1);
         if (w.entry.link < CELL_EMPTY_MAX) continue;
-        const uint index = w.entry.link - CELL_EMPTY_MAX;
-        const CellLeaf leaf = leaves[index];
+        const CellLeaf leaf = leaves[w.entry.link - CELL_EMPTY_MAX];
+        const uint index = CLUME_SCENE_BOUND ? 0u : w.entry.link - CELL_EMPTY_MAX;
         const float bound = learned[index], end = min_s(w.t_exit, w.t_end);
         float t = w.t;
         for (;;) {

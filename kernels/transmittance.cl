@@ -9,6 +9,7 @@
 // 10.1145/2661229.2661292]. `binary`: whether a free flight gets through.
 #include "strategy_progressive.cl"
 #include "strategy_decomposition.cl"
+#include "grid_transmittance.cl"
 
 #ifndef CLUME_EXACT_DEPTH  // in units of 1
 #define CLUME_EXACT_DEPTH 2
@@ -22,11 +23,10 @@ static ulong transmittance_limit(float e) {
 /// Estimate of the transmittance from o along d up to t_end; `limit` from transmittance_limit.
 static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit, Work* work, SCENE_ARGS) {
     ulong depth = 0;
-#if CLUME_ACCEL == ACCEL_CELLS
+#if CLUME_MIXTURE && CLUME_ACCEL == ACCEL_CELLS
     CellWalk w;
-    if (!cells_enter(&w, o, d, 0.0f, t_end, params, cells)) return 1.0f;
     float lower = -CLUME_INFINITY;
-    do {
+    if (cells_enter(&w, o, d, 0.0f, t_end, params, cells)) do {
         if (w.entry.link >= CELL_EMPTY_MAX) {
             const CellLeaf leaf = leaves[w.entry.link - CELL_EMPTY_MAX];
             for (uint g = leaf.first_group; g < leaf.first_group + leaf.group_count; ++g)
@@ -37,8 +37,12 @@ static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit
         COUNT(work, WORK_CELLS, 1);
         lower = w.t_exit;
     } while (cells_next(&w, CLUME_CELL_LEVELS, cells));
-#else
+#elif CLUME_MIXTURE
     depth = bvh_depth(o, d, 0.0f, t_end, limit, work, SCENE);
+    if (depth >= limit) return 0.0f;
+#endif
+#if CLUME_GRIDS
+    depth = grids_depth(depth, o, d, t_end, limit, work, SCENE);
     if (depth >= limit) return 0.0f;
 #endif
     const ulong exact = (ulong)CLUME_EXACT_DEPTH << 40;
@@ -57,14 +61,8 @@ static float transmittance_march(float3 o, float3 d, float t_end, Work* work, SC
     return depth < 100.0f ? exp_s(-depth) : 0.0f;
 }
 
-/// Estimate from o along d up to t_end; `bits`: for the roulette of `analytic`, the others take random numbers of r. Work and
-/// violations of bounds are added to those of `path`.
-static float transmittance_estimate(float3 o, float3 d, float t_end, uint bits, const Draws* r, Flight* path, SCENE_ARGS) {
-#if CLUME_TRANSMITTANCE == TRANSMITTANCE_ANALYTIC
-    return transmittance_analytic(o, d, t_end, transmittance_limit(exponential_s(bits)), &path->work, SCENE);
-#elif CLUME_TRANSMITTANCE == TRANSMITTANCE_MARCH
-    return transmittance_march(o, d, t_end, &path->work, SCENE);
-#else
+/// Estimate of the mixture's transmittance by null collisions, or by a flight.
+static float transmittance_sampled(float3 o, float3 d, float t_end, const Draws* r, Flight* path, SCENE_ARGS) {
     Flight f = *path;
     f.t = 0.0f;
     f.draw = DRAW_SHADOW;
@@ -86,6 +84,24 @@ static float transmittance_estimate(float3 o, float3 d, float t_end, uint bits, 
 #endif
     path->work = f.work;
     path->violations = f.violations;
+    return weight;
+}
+
+/// Estimate from o along d up to t_end; `bits`: for the roulette of `analytic`, the others take random numbers of r. Work and
+/// violations of bounds are added to those of `path`.
+static float transmittance_estimate(float3 o, float3 d, float t_end, uint bits, const Draws* r, Flight* path, SCENE_ARGS) {
+#if CLUME_TRANSMITTANCE == TRANSMITTANCE_ANALYTIC
+    return transmittance_analytic(o, d, t_end, transmittance_limit(exponential_s(bits)), &path->work, SCENE);
+#else
+    float weight = 1.0f;
+#if CLUME_MIXTURE && CLUME_TRANSMITTANCE == TRANSMITTANCE_MARCH
+    weight = transmittance_march(o, d, t_end, &path->work, SCENE);
+#elif CLUME_MIXTURE
+    weight = transmittance_sampled(o, d, t_end, r, path, SCENE);
+#endif
+#if CLUME_GRIDS
+    if (weight > 0.0f) weight *= grids_transmittance(o, d, t_end, r, path, SCENE);
+#endif
     return weight;
 #endif
 }

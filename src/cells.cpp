@@ -172,11 +172,12 @@ RootChoice choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree
     return best;
 }
 
-/// For each empty root, the Chebyshev distance to the nearest root that is not empty (or lies outside), capped.
-void measure_emptiness(Cells& cells) {
-    const glm::ivec3 n(cells.roots);
+}  // namespace
+
+void measure_emptiness(std::span<std::uint32_t> roots, const glm::uvec3& counts) {
+    const glm::ivec3 n(counts);
     const auto at = [&](int x, int y, int z) -> std::uint32_t& {
-        return cells.table[static_cast<std::size_t>(x) + static_cast<std::size_t>(n.x) * (static_cast<std::size_t>(y) + static_cast<std::size_t>(n.y) * static_cast<std::size_t>(z))];
+        return roots[static_cast<std::size_t>(x) + static_cast<std::size_t>(n.x) * (static_cast<std::size_t>(y) + static_cast<std::size_t>(n.y) * static_cast<std::size_t>(z))];
     };
     // Two sweeps of the 26-neighbour distance transform; beyond the grid counts as empty.
     const auto sweep = [&](int direction) {
@@ -201,8 +202,6 @@ void measure_emptiness(Cells& cells) {
     sweep(1);
     sweep(-1);
 }
-
-}  // namespace
 
 Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const CellOptions& options) {
     const std::size_t max_references = options.max_references;
@@ -287,7 +286,7 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
         blocks += s.blocks.size() / 8;
         s = {};
     }
-    measure_emptiness(cells);
+    measure_emptiness(std::span(cells.table).first(roots), cells.roots);
     return cells;
 }
 

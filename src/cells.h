@@ -55,4 +55,8 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
 /// 4,000 boxes bring it (branch and bound).
 double scene_bound(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree);
 
+/// For each empty root (an entry below CELL_EMPTY_MAX) of a table, x fastest, the Chebyshev distance to the nearest root that
+/// is not empty, capped: how far a ray may leap. Beyond the table all is empty.
+void measure_emptiness(std::span<std::uint32_t> roots, const glm::uvec3& counts);
+
 }  // namespace clume

@@ -129,6 +129,21 @@ std::vector<device::uint> active_pixels(const Scene& scene, const DeviceScene& d
             const glm::dmat3 axes = to_camera * p.axes * (e.extent + e.dilation + 1e-4);
             mark_ellipsoid(scene, f, from_eye(p.center), axes * glm::transpose(axes), coverage);
         }
+    for (const auto& box : device.grid_boxes) {
+        // The rectangle about the corners; everything if one lies behind the eye.
+        double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300;
+        bool behind = false;
+        for (const glm::dvec3& corner : box) {
+            const glm::dvec3 c = from_eye(corner);
+            const bool perspective = scene.camera.kind == CameraKind::perspective;
+            if (perspective && !(c.z > 1e-6 * glm::length(c))) behind = true;
+            const double scale = 1 / (perspective ? c.z * f.step : f.step);
+            x0 = std::min(x0, f.cx + c.x * scale), x1 = std::max(x1, f.cx + c.x * scale);
+            y0 = std::min(y0, f.cy - c.y * scale), y1 = std::max(y1, f.cy - c.y * scale);
+        }
+        if (behind) coverage.all();
+        else coverage.mark(x0, y0, x1, y1);
+    }
     for (const auto& light : scene.lights) {
         if (light.kind == LightKind::sphere) {
             mark_ellipsoid(scene, f, from_eye(light.center), glm::dmat3(light.radius * light.radius * 1.0001), coverage);

@@ -11,6 +11,7 @@
 #include "src/bvh.h"
 #include "src/cells.h"
 #include "src/device_camera.h"
+#include "src/device_grids.h"
 #include "src/device_lights.h"
 #include "src/device_mixture.h"
 #include "src/error.h"
@@ -44,6 +45,7 @@ MediaTraits pack_media(const Scene& scene, DeviceScene& out) {
     const Primitive* first = nullptr;
     double first_g = 0;
     bool uniform_emission = true;
+    std::vector<Primitive> grids(scene.grids.size());
     for (const auto& m : scene.media) {
         const bool own_g = std::any_of(m.primitives.begin(), m.primitives.end(), [](const Primitive& p) { return p.has_g; });
         const bool hg = own_g || (m.phase.kind == PhaseKind::henyey_greenstein && m.phase.g != 0);
@@ -64,6 +66,24 @@ MediaTraits pack_media(const Scene& scene, DeviceScene& out) {
             if (most > 0) t.emission = 2;
         }
     }
+    // A voxel medium is one more primitive, and a medium without a kernel.
+    for (std::size_t i = 0; i < scene.grids.size(); ++i) {
+        const GridMedium& m = scene.grids[i];
+        const device::uint phase = m.phase.kind == PhaseKind::rayleigh ? PHASE_RAYLEIGH : m.phase.kind == PhaseKind::henyey_greenstein && m.phase.g != 0 ? PHASE_HENYEY_GREENSTEIN : PHASE_ISOTROPIC;
+        out.media.push_back({0, phase, 0, static_cast<float>(m.phase.g)});
+        t.phases |= phase;
+        Primitive& p = grids[i];
+        p.albedo = m.albedo;
+        if (!m.emission_grid) p.emission = m.emission;
+        if (!first) first = &p, first_g = m.phase.g;
+        t.uniform_albedo = t.uniform_albedo && p.albedo == first->albedo;
+        uniform_emission = uniform_emission && p.emission == first->emission;
+        t.uniform_g = t.uniform_g && m.phase.g == first_g;
+        t.grey = t.grey && is_grey(m.albedo) && is_grey(m.emission);
+        const double most = std::max({p.emission.x, p.emission.y, p.emission.z});
+        t.brightest = std::max(t.brightest, most);
+        if (most > 0) t.emission = 2;
+    }
     if (t.emission && uniform_emission) t.emission = 1;
     const device::MediumInfo* same = nullptr;
     for (std::size_t i = 0; i < scene.media.size(); ++i) {
@@ -72,18 +92,29 @@ MediaTraits pack_media(const Scene& scene, DeviceScene& out) {
         if (same && (same->family != info.family || same->phase != info.phase || same->extent_squared != info.extent_squared)) t.one_medium = false;
         same = &info;
     }
+    for (std::size_t g = 0; g < scene.grids.size(); ++g) {
+        const auto& info = out.media[scene.media.size() + g];
+        if (same && same->phase != info.phase) t.one_medium = false;
+        same = same ? same : &info;
+    }
     if (first) {
         out.params.albedo = pack(first->albedo, first_g);
         out.params.emission = pack(first->emission);
     }
     const bool per_primitive = !t.uniform_albedo || !t.uniform_g || t.emission == 2 || (!t.one_medium && t.phases != PHASE_ISOTROPIC);
-    if (per_primitive)
+    if (per_primitive) {
         for (std::size_t m = 0; m < scene.media.size(); ++m)
             for (const auto& p : scene.media[m].primitives) {
                 out.shading.push_back(pack(p.albedo, p.has_g ? static_cast<double>(p.g) : scene.media[m].phase.g));
                 out.shading.push_back(pack(p.emission));
                 out.shading.back().w = as_float(static_cast<std::uint32_t>(m));
             }
+        for (std::size_t g = 0; g < scene.grids.size(); ++g) {
+            out.shading.push_back(pack(grids[g].albedo, scene.grids[g].phase.g));
+            out.shading.push_back(pack(grids[g].emission));
+            out.shading.back().w = as_float(static_cast<std::uint32_t>(scene.media.size() + g));
+        }
+    }
     if (!t.families) t.families = FAMILY_UNIFORM;
     if (!t.phases) t.phases = PHASE_ISOTROPIC;
     return t;
@@ -181,6 +212,11 @@ Normalization normalize(const Scene& scene) {
     for (const auto& m : scene.media)
         for (const auto& p : m.primitives)
             add(p.center, m.extent * glm::sqrt(p.axes[0] * p.axes[0] + p.axes[1] * p.axes[1] + p.axes[2] * p.axes[2]));
+    for (const auto& m : scene.grids) {
+        for (const glm::dvec3& p : grid_corners(m.density, m.interpolation)) add(p, glm::dvec3(0));
+        if (!m.emission_grid) continue;
+        for (const glm::dvec3& p : grid_corners(*m.emission_grid, m.interpolation)) add(p, glm::dvec3(0));
+    }
     for (const auto& l : scene.lights) {
         if (l.kind == LightKind::sphere) add(l.center, glm::dvec3(l.radius));
         if (l.kind == LightKind::rectangle)
@@ -199,7 +235,8 @@ std::uint64_t DeviceScene::byte_size() const {
     return sizeof(params) + sizeof(device::CellEntry) * cells.size() + sizeof(device::CellLeaf) * leaves.size() + sizeof(device::Reference) * references.size() + 8 * learned.size() +
            sizeof(device::Primitive) * primitives.size() + sizeof(device::BvhNode) * nodes.size() +
            4 * groups.size() + 4 * group_medium.size() + sizeof(device::MediumInfo) * media.size() + 16 * shading.size() +
-           sizeof(device::LightInfo) * lights.size() + 16 * texels.size() + sizeof(device::AliasEntry) * alias.size();
+           sizeof(device::LightInfo) * lights.size() + 16 * texels.size() + sizeof(device::AliasEntry) * alias.size() +
+           sizeof(device::GridInfo) * grids.size() + sizeof(device::CellEntry) * grid_cells.size() + 4 * grid_values.size();
 }
 
 std::string DeviceScene::hash() const {
@@ -208,6 +245,7 @@ std::string DeviceScene::hash() const {
     std::string all = sha256_hex(std::as_bytes(std::span(&seedless, 1)));
     all += hash_of(cells) + hash_of(leaves) + hash_of(references) + hash_of(primitives) + hash_of(nodes) + hash_of(groups) + hash_of(group_medium) + hash_of(media);
     all += hash_of(shading) + hash_of(lights) + hash_of(texels) + hash_of(alias);
+    if (!grids.empty()) all += hash_of(grids) + hash_of(grid_cells) + hash_of(grid_values);
     return sha256_hex(all);
 }
 
@@ -229,9 +267,10 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     out.params.bounds_min = pack(bounds.lo);
     out.params.bounds_max = pack(bounds.hi);
     const std::string accelerator = build_structures(wanted, r.majorant_grid, out);
+    const GridTraits voxels = pack_grids(scene, out);
     out.accelerator_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
-    const double brightest = std::max(lights.brightest, traits.brightest);
+    const double brightest = std::max({lights.brightest, traits.brightest, voxels.brightest});
     device::RenderParams& p = out.params;
     p.film_scale = static_cast<float>(std::exp2(-std::clamp(std::floor(std::log2(std::max(brightest, 1e-30))), -100.0, 100.0)));
     p.film_width = static_cast<device::uint>(scene.film.width);
@@ -247,6 +286,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
             for (const auto& m : scene.media)
                 for (const auto& q : m.primitives)
                     for (int k = 0; k < 3; ++k) step = std::min(step, glm::length(q.axes[k]) / 4);
+            step = std::min(step, voxels.voxel_edge / 2);
         }
         const double least = out.normalization.radius * 0x1p-20;
         if (r.step && step < least)
@@ -282,6 +322,8 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     define("CLUME_ACCEL", wanted.bvh ? 2 : 1);
     define("CLUME_COUNT", options.count_work || out.strategy == "progressive");  // its look-ups are reported
     if (wanted.bvh) define("CLUME_BVH_STACK", out.bvh_stack);
+    define("CLUME_MIXTURE", !out.ellipsoids.empty() || scene.grids.empty());
+    define_grids(scene, voxels, out);
     if (!out.cells.empty()) define("CLUME_CELL_LEVELS", out.params.cells_levels);
 
     const auto say = [&](const char* feature, std::string what) { out.explain.emplace_back(feature, std::move(what)); };
@@ -301,6 +343,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     say("lights found by paths", names(lights.hits, kinds));
     say("opaque surfaces", lights.present & (LIGHT_SPHERE | LIGHT_RECTANGLE) ? "tested on every ray" : "left out");
     say("visible background", lights.visible_background ? "yes" : "left out");
+    explain_grids(scene, voxels, out);
     say("colour", grey ? "one channel: everything is grey" : "RGB");
     say("depth limit", r.max_depth >= 0 ? std::to_string(r.max_depth) : "left out");
     return out;

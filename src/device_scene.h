@@ -3,6 +3,7 @@
 // program to what the scene uses. Same bytes on every host (no contraction, no -march).
 #pragma once
 
+#include <array>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,12 +31,16 @@ struct DeviceScene {
     std::vector<device::LightInfo> lights;
     std::vector<device::float4> texels;
     std::vector<device::AliasEntry> alias;
+    std::vector<device::GridInfo> grids;
+    std::vector<device::CellEntry> grid_cells;
+    std::vector<float> grid_values;
 
     std::vector<std::pair<std::string, std::string>> defines;  ///< of the render program, but CLUME_WIDTH
     std::vector<std::pair<std::string, std::string>> explain;  ///< feature → what the program does about it
     std::string strategy, transmittance, bound;                ///< what `auto` became
     std::uint32_t bvh_stack = 0;                               ///< entries of a traversal's stack
     std::vector<Ellipsoid> ellipsoids;
+    std::vector<std::array<glm::dvec3, 8>> grid_boxes;         ///< per grid that holds anything: corners around it, world units
     double accelerator_s = 0;                                  ///< seconds to build it
 
     std::uint64_t byte_size() const;

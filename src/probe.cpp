@@ -96,6 +96,17 @@ ProbeRun<ProbeHit> Probe::flights(std::span<const ProbeRay> r, std::uint32_t sam
 ProbeRun<ProbeHit> Probe::transmittances(std::span<const ProbeRay> r) { return rays(r, 0, 2); }
 ProbeRun<ProbeHit> Probe::roulette_transmittances(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 4); }
 
+ProbeRun<ProbeGrid> Probe::grid(std::span<const ProbeRay> rays, std::uint32_t g) {
+    Impl& s = *impl_;
+    static_assert(sizeof(ProbeGrid) == 16);
+    Buffer<ProbeRay> in(s.queue, rays);
+    Buffer<ProbeGrid> out(s.queue, rays.size());
+    ProbeRun<ProbeGrid> result;
+    result.device_s = s.run_in_scene("probe_grid", rays.size(), in, out, cl_uint(rays.size()), cl_uint(g));
+    result.values = out.download();
+    return result;
+}
+
 ProbeRun<ProbeHit> Probe::estimated_transmittances(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 8); }
 
 std::vector<ProbeRay> Probe::camera_rays(std::span<const std::uint32_t> pixels, std::uint32_t sample) {

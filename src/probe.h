@@ -34,6 +34,12 @@ struct ProbeHit {
     bool collided() const { return t < 1e30f; }
 };
 
+/// What one ray gave against one voxel grid: depth up to t_end, t at which it reaches `tau` (1e30 if not), density at t_end,
+/// light of the emission grids along it, first channel. ProbeRay::unused is tau.
+struct ProbeGrid {
+    float depth, t, density, emission;
+};
+
 /// One ray against the 16 lanes of one group, as `probe_group` takes it: interval [t0, t1], optical depth tau.
 struct ProbeGroupRay {
     float origin[3];
@@ -85,6 +91,8 @@ public:
     /// Transmittances up to t_end by the program's estimator.
     ProbeRun<ProbeHit> estimated_transmittances(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
     ProbeRun<ProbeHit> roulette_transmittances(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
+    /// Every ray against grid g of the scene alone, which has one.
+    ProbeRun<ProbeGrid> grid(std::span<const ProbeRay> rays, std::uint32_t g = 0);
     /// Camera rays of film pixels (x + width · y), as the renderer's sample `sample` has them.
     std::vector<ProbeRay> camera_rays(std::span<const std::uint32_t> pixels, std::uint32_t sample = 0);
 

@@ -72,7 +72,7 @@ RenderImage develop(const Film& size, const glm::dvec3& b, const CropWindow& w, 
 
 void check_memory(const Scene& scene, const DeviceScene& device, const std::vector<DeviceInfo>& devices) {
     for (const auto& d : devices)
-        if (device.byte_size() > d.global_memory || 4 * device.groups.size() > d.max_allocation)
+        if (device.byte_size() > d.global_memory || 4 * std::max(device.groups.size(), device.grid_values.size()) > d.max_allocation)
             throw RenderError(fmt::format("{}: the scene needs {:.1f} MB on the device, {} has {:.1f} MB ({:.1f} MB in one buffer)", scene.path,
                                           static_cast<double>(device.byte_size()) / 1e6, d.label(), static_cast<double>(d.global_memory) / 1e6,
                                           static_cast<double>(d.max_allocation) / 1e6));

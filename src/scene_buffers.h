@@ -27,13 +27,17 @@ struct SceneBuffers {
           texels(queue, scene.texels),
           alias(queue, scene.alias),
           learned(queue, scene.learned),
-          raised(queue, std::vector<device::uint>(scene.learned.size())) {}
+          raised(queue, std::vector<device::uint>(scene.learned.size())),
+          grids(queue, scene.grids),
+          grid_cells(queue, scene.grid_cells),
+          grid_values(queue, scene.grid_values) {}
 
-    static constexpr unsigned kArgs = 15;  ///< arguments that `bind` sets
+    static constexpr unsigned kArgs = 18;  ///< arguments that `bind` sets
 
     /// Sets arguments 0 to kArgs − 1.
     void bind(Queue& queue, cl::Kernel& kernel) const {
-        set_args(queue, kernel, 0, params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias, learned, raised);
+        set_args(queue, kernel, 0, params, cells, leaves, references, primitives, nodes, groups, group_medium, media, shading, lights, texels, alias, learned, raised, grids,
+                 grid_cells, grid_values);
     }
 
     Buffer<device::RenderParams> params;
@@ -51,6 +55,9 @@ struct SceneBuffers {
     Buffer<device::AliasEntry> alias;
     Buffer<float> learned;
     Buffer<device::uint> raised;
+    Buffer<device::GridInfo> grids;
+    Buffer<device::CellEntry> grid_cells;
+    Buffer<float> grid_values;
 };
 
 }  // namespace clume

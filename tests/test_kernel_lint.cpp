@@ -75,6 +75,25 @@ TEST_CASE("Kernels.LintIsClean") {
     }
 }
 
+TEST_CASE("Kernels.LintIsCleanWithGrids") {
+    if (!has_clang()) {
+        WARN("SKIPPED: clang is not installed, kernels are not linted");
+        return;
+    }
+    const int strategy = GENERATE(1, 2, 3), transmittance = GENERATE(1, 2, 3, 4, 5), mixture = GENERATE(0, 1);
+    // Bounds, interpolations, levels, emission and counting go round with the others.
+    const int k = strategy + 3 * transmittance + mixture;
+    const std::string defines = "-DCLUME_GRIDS=" + std::to_string(1 + k % 3) + " -DCLUME_STRATEGY=" + std::to_string(strategy) + " -DCLUME_TRANSMITTANCE=" + std::to_string(transmittance) +
+                                " -DCLUME_MIXTURE=" + std::to_string(mixture) + " -DCLUME_SCENE_BOUND=" + std::to_string(k % 2) + " -DCLUME_GRID_BOUNDS=" + std::to_string(k / 2 % 2) +
+                                " -DCLUME_GRID_KINDS=" + std::to_string(1 + k % 3) + " -DCLUME_GRID_LEVELS=" + std::to_string(k % 4) + " -DCLUME_GRID_EMISSION=" + std::to_string(k % 2) +
+                                " -DCLUME_COUNT=" + std::to_string(k % 2) + " -DCLUME_BISECTION=" + std::to_string(k / 3 % 2);
+    for (const std::string& root : program_roots()) {
+        const LintResult result = lint(clume::assemble_source(root), defines);
+        INFO(root << " " << defines << "\n" << result.output);
+        CHECK(result.passed);
+    }
+}
+
 TEST_CASE("Kernels.LintFindsWhatOpenClForbids") {
     if (!has_clang()) {
         WARN("SKIPPED: clang is not installed, kernels are not linted");

@@ -55,6 +55,11 @@ struct Entry {
 HostMedium::HostMedium(const Scene& scene, int cells) {
     pack(scene);
     if (!primitives_.empty()) fill_cells(std::max(1, cells));
+    for (const GridMedium& m : scene.grids) {
+        grids_.emplace_back(m.density, m.interpolation, m.density_scale);
+        if (m.emission_grid) glows_.emplace_back(HostGrid(*m.emission_grid, m.interpolation, 1), m.emission);
+        materials_.push_back({m.albedo, m.emission_grid ? glm::dvec3(0) : (1.0 - m.albedo) * m.emission, m.phase});
+    }
 }
 
 void HostMedium::pack(const Scene& scene) {
@@ -159,6 +164,26 @@ double HostMedium::max_extinction(const glm::dvec3& x) const {
 }
 
 HostCollision HostMedium::fly(const HostRay& ray, double t_max, HostRandom& random) const {
+    HostCollision first = fly_mixture(ray, t_max, random);
+    for (std::size_t g = 0; g < grids_.size(); ++g) {
+        const double best = first.primitive < 0 ? t_max : first.t, t = grids_[g].fly(ray.origin, ray.direction, best, random);
+        if (t < best) first = {static_cast<int>(primitives_.size() + g), t};
+    }
+    return first;
+}
+
+glm::dvec3 HostMedium::glow(const HostRay& ray, double t_max, HostRandom& random) const {
+    glm::dvec3 sum(0);
+    for (const auto& [grid, factor] : glows_) {
+        double t0 = 0, t1 = t_max;
+        if (!grid.clip(ray.origin, ray.direction, t0, t1)) continue;
+        const double t = t0 + (t1 - t0) * random.uniform();
+        sum += factor * grid.at(ray.origin + t * ray.direction) * (t1 - t0);
+    }
+    return sum;
+}
+
+HostCollision HostMedium::fly_mixture(const HostRay& ray, double t_max, HostRandom& random) const {
     if (empty()) return {};
     return gaussian_only_ ? walk<true>(ray, t_max, random) : walk<false>(ray, t_max, random);
 }

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "src/scene.h"
+#include "tests/reference/host_grid.h"
 #include "tests/reference/host_random.h"
 
 #include <cstdint>
@@ -53,6 +54,9 @@ public:
     /// Bound of the cell that holds x, 0 outside the bounds.
     double max_extinction(const glm::dvec3& x) const;
 
+    /// Light that emission grids add on average along [0, t_max]: j at one uniform point of it, times the length.
+    glm::dvec3 glow(const HostRay& ray, double t_max, HostRandom& random) const;
+
     bool empty() const { return primitives_.empty(); }
     const glm::dvec3& lower() const { return lower_; }
     const glm::dvec3& upper() const { return upper_; }
@@ -63,7 +67,9 @@ private:
     glm::dvec3 lower_{0}, upper_{0}, cell_size_{1}, inv_cell_size_{1};
     glm::ivec3 resolution_{0};
     std::vector<HostPrimitive> primitives_;
-    std::vector<HostMaterial> materials_;
+    std::vector<HostMaterial> materials_;  ///< of the primitives, then of the grids
+    std::vector<HostGrid> grids_;
+    std::vector<std::pair<HostGrid, glm::dvec3>> glows_;  ///< emission grids with their factors
     std::vector<float> majorants_;        ///< per cell, rounded up
     std::vector<std::uint32_t> offsets_;  ///< per cell + 1, into lists_
     std::vector<std::uint32_t> lists_;    ///< primitive indices, the largest in the cell first
@@ -72,6 +78,7 @@ private:
     void pack(const Scene& scene);
     void fill_cells(int cells);
     long cell_of(const glm::dvec3& x) const;
+    HostCollision fly_mixture(const HostRay& ray, double t_max, HostRandom& random) const;
     template <bool gaussian_only> HostCollision walk(const HostRay& ray, double t_max, HostRandom& random) const;
     std::span<const std::uint32_t> list(std::size_t cell) const {
         return {lists_.data() + offsets_[cell], lists_.data() + offsets_[cell + 1]};

@@ -52,6 +52,7 @@ HostTracer::Sample HostTracer::trace_path(HostRay ray, HostRandom& random) const
         SurfaceHit surface{infinity, glm::dvec3(0)};
         if (lights_.has_surfaces()) surface = lights_.nearest_surface(ray);
         const HostCollision collision = medium_.fly(ray, surface.t, random);
+        radiance += beta * medium_.glow(ray, collision.primitive < 0 ? surface.t : collision.t, random);
         if (collision.primitive < 0) {
             if (surface.t < infinity) {
                 if (depth == 0) opaque = true;
