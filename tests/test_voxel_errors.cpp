@@ -76,7 +76,7 @@ std::string raw(Value value) {
 /// Limits the address space while it lives, so that a reader that asks for more gets std::bad_alloc.
 class MemoryLimit {
   public:
-    explicit MemoryLimit(std::uint64_t extra) {
+    explicit MemoryLimit([[maybe_unused]] std::uint64_t extra) {
         getrlimit(RLIMIT_AS, &before_);
 #ifndef __SANITIZE_ADDRESS__
         std::ifstream in("/proc/self/statm");
