@@ -24,9 +24,15 @@ struct Range {
 
 /// Where the density may not be 0, lattice coordinates (scene.h).
 Range support_of(const VoxelGrid& g, Interpolation interpolation) {
-    const glm::dvec3 lo(g.lo), hi(g.hi);
-    if (g.sparse && interpolation == Interpolation::trilinear) return {lo - 1.0, hi};
-    return {lo - 0.5, hi - 0.5};
+    const bool wide = g.sparse && interpolation == Interpolation::trilinear;
+    return {glm::dvec3(g.lo) - (wide ? 1.0 : 0.5), glm::dvec3(g.hi) - (wide ? 0.0 : 0.5)};
+}
+
+/// Of a box in lattice coordinates, world units.
+std::array<glm::dvec3, 8> corners_of(const VoxelGrid& g, const Range& r) {
+    std::array<glm::dvec3, 8> corners;
+    for (int c = 0; c < 8; ++c) corners[static_cast<std::size_t>(c)] = g.origin + g.axes * glm::dvec3(c & 1 ? r.hi.x : r.lo.x, c & 2 ? r.hi.y : r.lo.y, c & 4 ? r.hi.z : r.lo.z);
+    return corners;
 }
 
 int floor_div(int a, int b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
@@ -212,9 +218,7 @@ void add_bounds(const Layout& l, double per_root, int along, std::size_t first_v
     std::vector<std::uint32_t> links(most.size());
     for (std::size_t i = 0; i < most.size(); ++i) links[i] = most[i] > 0 ? CELL_EMPTY_MAX : 1;
     measure_emptiness(links, counts);
-    info.bounds_x = counts.x;
-    info.bounds_y = counts.y;
-    info.bounds_z = counts.z;
+    info.bounds_x = counts.x, info.bounds_y = counts.y, info.bounds_z = counts.z;
     info.first_bound = static_cast<device::uint>(out.grid_cells.size());
     for (std::size_t i = 0; i < most.size(); ++i) out.grid_cells.push_back({links[i], static_cast<float>(static_cast<double>(most[i]) * kSlack), 0, 0});
 }
@@ -253,9 +257,7 @@ void add_grid(const Layout& l, std::uint32_t levels, int bounds, DeviceScene& ou
     info.emission_grid = GRID_NONE;
     const double per_root = static_cast<double>(kBrick << levels);
     const glm::uvec3 roots = (glm::uvec3(l.bricks) + (1u << levels) - 1u) >> levels;
-    info.roots_x = roots.x;
-    info.roots_y = roots.y;
-    info.roots_z = roots.z;
+    info.roots_x = roots.x, info.roots_y = roots.y, info.roots_z = roots.z;
 
     // root cells = (lattice − base + shift) / per_root; lattice = axes⁻¹ (world − origin). About the support's centre, whose
     // float is what the device subtracts.
@@ -316,46 +318,13 @@ std::array<glm::dvec3, 8> stored_corners(const Layout& l) {
     }
     r.lo = glm::max(r.lo, l.support.lo);
     r.hi = glm::min(r.hi, l.support.hi);
-    std::array<glm::dvec3, 8> corners;
-    for (int c = 0; c < 8; ++c) corners[static_cast<std::size_t>(c)] = l.grid.origin + l.grid.axes * glm::dvec3(c & 1 ? r.hi.x : r.lo.x, c & 2 ? r.hi.y : r.lo.y, c & 4 ? r.hi.z : r.lo.z);
-    return corners;
+    return corners_of(l.grid, r);
 }
 
 }  // namespace
 
-void define_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out) {
-    if (scene.grids.empty()) return;
-    const auto define = [&](const char* name, std::size_t value) {
-        for (auto& [key, text] : out.defines)
-            if (key == name) return void(text = std::to_string(value));
-        out.defines.emplace_back(name, std::to_string(value));
-    };
-    define("CLUME_GRIDS", scene.grids.size());
-    define("CLUME_GRID_LEVELS", traits.levels);
-    define("CLUME_GRID_KINDS", traits.kinds);
-    define("CLUME_GRID_BOUNDS", traits.tables);
-    define("CLUME_GRID_EMISSION", traits.emission_grids);
-    define("CLUME_SCENE_BOUND", scene.render.bound == "scene");
-    const char* estimators[] = {"analytic", "march", "ratio", "residual-ratio", "binary"};
-    for (std::size_t i = 0; i < std::size(estimators); ++i)
-        if (out.transmittance == estimators[i]) define("CLUME_TRANSMITTANCE", i + 1);
-    if (scene.render.root_finding == "bisection") define("CLUME_BISECTION", 1);
-}
-
-void explain_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out) {
-    if (scene.grids.empty()) return;
-    const char* bound = scene.render.bound == "scene" ? "null collisions under one bound each" : traits.tables ? "null collisions under a table of bounds" : "null collisions under the bricks' bounds";
-    const bool nulls = out.strategy == "delta" || out.strategy == "progressive";
-    out.explain.emplace_back("voxel media", fmt::format("{}: {} bricks of 8x8x8, {} octree levels, flights by {}", scene.grids.size(), traits.bricks, traits.levels,
-                                                        nulls ? bound : out.strategy == "march" ? "marching" : "exact walks from voxel to voxel"));
-    out.explain.emplace_back("emission grids", traits.emission_grids ? "integrated along every flight" : "left out");
-}
-
 std::array<glm::dvec3, 8> grid_corners(const VoxelGrid& grid, Interpolation interpolation) {
-    const Range r = support_of(grid, interpolation);
-    std::array<glm::dvec3, 8> corners;
-    for (int c = 0; c < 8; ++c) corners[static_cast<std::size_t>(c)] = grid.origin + grid.axes * glm::dvec3(c & 1 ? r.hi.x : r.lo.x, c & 2 ? r.hi.y : r.lo.y, c & 4 ? r.hi.z : r.lo.z);
-    return corners;
+    return corners_of(grid, support_of(grid, interpolation));
 }
 
 GridTraits pack_grids(const Scene& scene, DeviceScene& out) {
@@ -393,8 +362,7 @@ GridTraits pack_grids(const Scene& scene, DeviceScene& out) {
         }
         if (!layouts[i].stored.empty()) out.grid_boxes.push_back(stored_corners(layouts[i]));
     }
-    std::size_t next = scene.grids.size();
-    for (std::size_t g = 0; g < scene.grids.size(); ++g) {
+    for (std::size_t g = 0, next = scene.grids.size(); g < scene.grids.size(); ++g) {
         const GridMedium& m = scene.grids[g];
         device::GridInfo& info = out.grids[g];
         info.primitive = static_cast<device::uint>(out.ellipsoids.size() + g);
@@ -403,8 +371,8 @@ GridTraits pack_grids(const Scene& scene, DeviceScene& out) {
         traits.emission_grids = true;
         info.emission_grid = static_cast<device::uint>(next);
         info.emission = {static_cast<float>(m.emission.x), static_cast<float>(m.emission.y), static_cast<float>(m.emission.z), 0};
-        const auto corners = grid_corners(*m.emission_grid, m.interpolation);
         double longest = 0;
+        const auto corners = grid_corners(*m.emission_grid, m.interpolation);
         for (const auto& a : corners)
             for (const auto& b : corners) longest = std::max(longest, glm::length(a - b));
         traits.brightest = std::max(traits.brightest, std::max({m.emission.x, m.emission.y, m.emission.z}) * static_cast<double>(out.grids[next].bound) * longest * out.normalization.scale);

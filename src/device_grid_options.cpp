@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// What a program is told about the scene's voxel media, and what `--explain` says of them.
+#include <fmt/format.h>
+#include <iterator>
+
+#include "src/device_grids.h"
+
+namespace clume {
+
+void define_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out) {
+    if (scene.grids.empty()) return;
+    const auto define = [&](const char* name, std::size_t value) {
+        for (auto& [key, text] : out.defines)
+            if (key == name) return void(text = std::to_string(value));
+        out.defines.emplace_back(name, std::to_string(value));
+    };
+    define("CLUME_GRIDS", scene.grids.size());
+    define("CLUME_GRID_LEVELS", traits.levels);
+    define("CLUME_GRID_KINDS", traits.kinds);
+    define("CLUME_GRID_BOUNDS", traits.tables);
+    define("CLUME_GRID_EMISSION", traits.emission_grids);
+    define("CLUME_SCENE_BOUND", scene.render.bound == "scene");
+    const char* estimators[] = {"analytic", "march", "ratio", "residual-ratio", "binary"};
+    for (std::size_t i = 0; i < std::size(estimators); ++i)
+        if (out.transmittance == estimators[i]) define("CLUME_TRANSMITTANCE", i + 1);
+    if (scene.render.root_finding == "bisection") define("CLUME_BISECTION", 1);
+}
+
+void explain_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out) {
+    if (scene.grids.empty()) return;
+    const char* bound = scene.render.bound == "scene" ? "null collisions under one bound each" : traits.tables ? "null collisions under a table of bounds" : "null collisions under the bricks' bounds";
+    const bool nulls = out.strategy == "delta" || out.strategy == "progressive";
+    out.explain.emplace_back("voxel media", fmt::format("{}: {} bricks of 8x8x8, {} octree levels, flights by {}", scene.grids.size(), traits.bricks, traits.levels,
+                                                        nulls ? bound : out.strategy == "march" ? "marching" : "exact walks from voxel to voxel"));
+    out.explain.emplace_back("emission grids", traits.emission_grids ? "integrated along every flight" : "left out");
+}
+
+}  // namespace clume
