@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 constexpr const char* prefix = ".clume-plot-";
 
 /// In the order of strategies(); kept with the name, so that a strategy has one colour in every plot and report.
-constexpr std::array colours{"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"};
+constexpr std::array colours{"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#777777"};
 constexpr std::array points{7, 5, 9, 13, 11};  ///< filled; the one before each is hollow
 
 template <class Table>
@@ -39,6 +39,19 @@ std::string style(const MethodPair& p) {
 
 /// A number for gnuplot; NaN is a gap.
 std::string number(double v) { return std::isfinite(v) ? fmt::format("{:.6g}", v) : "NaN"; }
+
+/// Labelled tics of a logarithmic axis from `least` to `most`: 1, 2 and 5 of each decade, or 1 alone over many decades.
+std::string log_tics(double least, double most) {
+    const bool many = most > 1e3 * least;
+    std::string tics;
+    for (int decade = static_cast<int>(std::floor(std::log10(least))); decade <= static_cast<int>(std::ceil(std::log10(most))); ++decade)
+        for (const int digit : {1, 2, 5}) {
+            const double v = digit * std::pow(10.0, decade);
+            if ((many && digit != 1) || v < 0.999 * least || v > 1.001 * most) continue;
+            tics += fmt::format("{}'{:.6g}' {:.6g}", tics.empty() ? "(" : ", ", v, v);
+        }
+    return tics.empty() ? "autofreq" : tics + ")";
+}
 
 /// Pairs with rows at the last level, in order of `key`, ascending.
 template <class Key>
@@ -60,10 +73,10 @@ std::string outputs(const char* name, int width, int height, const std::string& 
 
 std::string rmse_plot(const Comparison& c, const CompareSummary& s) {
     std::string data, plot = "plot ";
-    const auto order = measured(c, s, [&](std::size_t k) { return k; });
+    const auto order = measured(c, s, [](std::size_t k) { return k; });
     std::size_t levels = 0;
     for (const CompareRow& row : c.rows) levels = std::max(levels, row.level + 1);
-    double least_s = INFINITY, most_s = 0, best = INFINITY;
+    double least_s = INFINITY, most_s = 0, best = INFINITY, least_mse = INFINITY, most_mse = 0;
     for (const std::size_t k : order) {
         data += fmt::format("$rmse{} << EOD\n", k);
         for (std::size_t level = 0; level < levels; ++level) {
@@ -75,20 +88,24 @@ std::string rmse_plot(const Comparison& c, const CompareSummary& s) {
             least_s = std::min(least_s, l.seconds);
             most_s = std::max(most_s, l.seconds);
             best = std::min(best, l.mse.mean * l.seconds);
+            least_mse = std::min(least_mse, l.mse.mean);
+            most_mse = std::max(most_mse, l.mse.mean + spread);
         }
         data += "EOD\n";
         plot += fmt::format("{}$rmse{} using 1:2:3:4 with yerrorlines {} title '{}'", k == order.front() ? "" : ", \\\n     ", k, style(c.pairs[k].pair), c.pairs[k].pair.label());
     }
     if (!(most_s > 0)) return "";
-    // The slope is drawn a little below the best pair, where no data are.
-    const double height = 0.55 * std::sqrt(best);
-    plot += fmt::format(", \\\n     [{}:{}] {}/sqrt(x) with lines lc rgb '#888888' lw 1.5 dt 2 title 'slope −1/2'\n", number(least_s), number(most_s), number(height));
-    const int rows = static_cast<int>(order.size()) + 1;
-    return data + outputs("rmse", 960, std::max(560, 120 + 22 * rows),
-                          fmt::format("set title 'Error against time'\nset xlabel 'seconds per image'\nset ylabel 'RMSE'\nset logscale xy\nset format xy '%.3g'\n"
-                                      "set key outside right top reverse Left samplen 3 width 1\nset grid xtics ytics mytics lc rgb '#dddddd' lw 1\n"
-                                      "set xrange [{}:{}]\nset yrange [*:*]\n",
-                                      number(0.8 * least_s), number(1.25 * most_s)) + plot) +
+    // The slope is drawn below the best pair, where no data are.
+    const double height = 0.7 * std::sqrt(best), low = std::min(0.8 * std::sqrt(least_mse), 0.9 * height / std::sqrt(most_s)), high = 1.25 * std::sqrt(most_mse);
+    least_s *= 0.8;
+    most_s *= 1.25;
+    plot += fmt::format(", \\\n     [{}:{}] {}/sqrt(x) with lines lc rgb '#666666' lw 1.5 dt 2 title 'slope −1/2'\n", number(least_s), number(most_s), number(height));
+    const int key_rows = (static_cast<int>(order.size()) + 3) / 3;
+    return data + outputs("rmse", 960, 540 + 24 * key_rows,
+                          fmt::format("set title 'Error against time'\nset xlabel \"seconds per image\\n \"\nset ylabel 'RMSE'\nset logscale xy\n"
+                                      "set xtics {}\nset ytics {}\nset key below left reverse Left samplen 3 maxcols 3\n"
+                                      "set grid xtics ytics lc rgb '#dddddd' lw 1 dt 1\nset rmargin 4\nset xrange [{}:{}]\nset yrange [{}:{}]\n",
+                                      log_tics(least_s, most_s), log_tics(low, high), number(least_s), number(most_s), number(low), number(high)) + plot) +
            "reset\n";
 }
 
@@ -115,7 +132,7 @@ std::string efficiency_plot(const Comparison& c, const CompareSummary& s) {
         const Interval& e = s.pairs[order[i]].last.inverse_efficiency;
         const double spread = std::isfinite(e.half_width) ? e.half_width : 0;
         most = std::max(most, e.mean + spread);
-        data += fmt::format("{} {} {} {} '{:.3g}'\n", i, number(e.mean), number(std::max(e.mean - spread, 0.0)), number(e.mean + spread), e.mean);
+        data += fmt::format("{} {} {} {}\n", i, number(e.mean), number(std::max(e.mean - spread, 0.0)), number(e.mean + spread));
     }
     data += "EOD\n";
     for (std::size_t i = 0; i < order.size(); ++i) {
@@ -123,21 +140,21 @@ std::string efficiency_plot(const Comparison& c, const CompareSummary& s) {
         plot += fmt::format("$efficiency every ::{}::{} using (0.5*($2+low)):1:(low):2:($1-0.34):($1+0.34) with boxxyerror fs solid {} lc rgb '{}' notitle, \\\n     ", i, i,
                             p.bound == "auto" ? "0.75" : "0.4", colours[index_of(strategies(), p.strategy) % colours.size()]);
     }
-    plot += "$efficiency using 2:1:3:4 with xerrorbars pt 0 lw 2 lc rgb '#444444' notitle, \\\n     "
-            "$efficiency using 4:1:5 with labels left offset 1,0 notitle\n";
+    plot += "$efficiency using 2:1:3:4 with xerrorbars pt 0 lw 2 lc rgb '#000000' notitle, \\\n     "
+            "$efficiency using 4:1:(sprintf('%.3g', $2)) with labels left offset 1,0 notitle\n";
     const bool wide = most > 20 * best;
     const std::string axis = wide ? fmt::format("low = {}\nset logscale x\nset xrange [low:{}]\n", number(std::pow(10, std::floor(std::log10(0.7 * best)))), number(3 * most))
                                   : fmt::format("low = 0\nset xrange [0:{}]\n", number(1.2 * most));
     return data + axis +
            outputs("inverse_efficiency", 960, std::max(260, 130 + 34 * static_cast<int>(order.size())),
                    "set title 'Inverse efficiency: time for a given error; shorter is better'\nset xlabel 'mse × seconds, with its 95 % interval'\n"
-                   "set format x '%.3g'\nset grid xtics lc rgb '#dddddd' lw 1\nset border 1\nset tics nomirror\n" + named_rows(c, order) + plot) +
+                   "set format x '%.3g'\nset grid xtics lc rgb '#dddddd' lw 1 dt 1\nset border 1\nset rmargin 4\nset tics nomirror\n" + named_rows(c, order) + plot) +
            "reset\n";
 }
 
 std::string bias_plot(const Comparison& c, const CompareSummary& s) {
     const double mean = c.reference.mean();
-    auto order = measured(c, s, [&](std::size_t k) { return std::abs(s.pairs[k].last.bias.mean); });
+    auto order = measured(c, s, [](std::size_t k) { return k; });
     std::erase_if(order, [&](std::size_t k) { return !std::isfinite(s.pairs[k].last.bias.half_width); });
     if (order.empty() || !(mean > 0)) return "";
     std::string data = "$bias << EOD\n", plot = "plot ";
@@ -152,8 +169,8 @@ std::string bias_plot(const Comparison& c, const CompareSummary& s) {
     most = most > 0 ? 1.15 * most : 1;
     return data +
            outputs("bias", 960, std::max(260, 130 + 34 * static_cast<int>(order.size())),
-                   fmt::format("set title 'Bias of the image’s mean'\nset xlabel '% of the reference’s mean, with its 95 % interval'\nset format x '%+.3g'\n"
-                               "set xrange [{}:{}]\nset grid xtics lc rgb '#dddddd' lw 1\nset border 1\nset tics nomirror\n"
+                   fmt::format("set title 'Bias of the image’s mean'\nset xlabel '% of the reference’s mean, with its 95 % interval'\nset format x '%.3g'\n"
+                               "set xrange [{}:{}]\nset grid xtics lc rgb '#dddddd' lw 1 dt 1\nset border 1\nset rmargin 4\nset tics nomirror\n"
                                "set arrow 1 from 0,graph 0 to 0,graph 1 nohead lc rgb '#444444' lw 1.5 back\n",
                                number(-most), number(most)) +
                        named_rows(c, order) + plot + "\n") +

@@ -188,7 +188,7 @@ std::vector<std::string> Writer::write_plots() {
 
 }  // namespace
 
-void prepare_report_folder(const fs::path& folder, const std::string& command) {
+bool prepare_report_folder(const fs::path& folder, const std::string& command) {
     std::error_code error;
     if (fs::exists(folder, error)) {
         if (!fs::is_directory(folder, error)) throw RenderError(folder.string() + ": is not a folder");
@@ -196,7 +196,7 @@ void prepare_report_folder(const fs::path& folder, const std::string& command) {
             if (error) throw RenderError(folder.string() + ": cannot be read: " + error.message());
             if (!is_report(folder)) throw RenderError(folder.string() + ": is not empty and holds no report of clume compare; nothing was changed in it");
             check_writable(folder / "results.json");
-            return;
+            return false;
         }
     } else {
         fs::create_directories(folder, error);
@@ -207,6 +207,13 @@ void prepare_report_folder(const fs::path& folder, const std::string& command) {
     ReportFacts facts;
     facts.command = command;
     write_file(folder / "results.json", comparison_to_json(nothing, summarise(nothing), facts));
+    return true;
+}
+
+void discard_report_folder(const fs::path& folder) {
+    std::error_code ignored;
+    fs::remove(folder / "results.json", ignored);
+    fs::remove(folder, ignored);
 }
 
 std::vector<std::string> write_report(const fs::path& folder, const Comparison& comparison, const CompareSummary& summary, const std::string& command) {

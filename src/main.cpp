@@ -132,10 +132,16 @@ int run(const RenderCommand& command) {
 int run(const CompareCommand& command) {
     install_interrupt_handlers();
     const Scene scene = read_scene(command.scene, command.overrides);
-    prepare_report_folder(command.folder, command.line);
+    const bool fresh = prepare_report_folder(command.folder, command.line);
     ProgressReporter progress(command.quiet);
-    const Comparison comparison = compare(
-        scene, command.options, [&](const Progress& p) { progress.update(p); }, stop_requested());
+    Comparison comparison;
+    try {
+        comparison = compare(
+            scene, command.options, [&](const Progress& p) { progress.update(p); }, stop_requested());
+    } catch (...) {
+        if (fresh) discard_report_folder(command.folder);
+        throw;
+    }
     progress.finish();
     const CompareSummary summary = summarise(comparison);
     std::vector<std::string> warnings = comparison.warnings;
