@@ -89,7 +89,7 @@ void say_cheapest_biased(const Comparison& c, CompareSummary& s) {
         if (s.fastest_unbiased && p.test.rms > 0) {
             const double floor_s = s.pairs[*s.fastest_unbiased].last.inverse_efficiency.mean / (p.test.rms * p.test.rms);
             if (floor_s > 0)
-                text += fmt::format(" No number of samples takes its error below {:.2g}; {} is there after {:.2g} s.", p.test.rms,
+                text += fmt::format(" No number of samples takes its error below {:.2g}; {} is there after {:.3g} s.", p.test.rms,
                                     c.pairs[*s.fastest_unbiased].pair.label(), floor_s);
         }
     } else if (p.finding == Finding::no_bias_found) {
