@@ -28,17 +28,18 @@ struct KeyFlag {
     const char* key;
     const char* value;
     const char* help;
+    bool compare;  ///< goes with `compare` as well
 };
 
 /// Flags that are another way to say -D; the scene reader checks their values.
 constexpr std::array key_flags{
-    KeyFlag{"--spp", "render.spp", "N", "samples per pixel"},
-    KeyFlag{"--seed", "render.seed", "S", "seed of the random numbers"},
-    KeyFlag{"--max-depth", "render.max_depth", "N", "most scattering events on a path; -1: no limit"},
-    KeyFlag{"--strategy", "render.strategy", "NAME", "distance sampling"},
-    KeyFlag{"--transmittance", "render.transmittance", "NAME", "transmittance estimator"},
-    KeyFlag{"--bound", "render.bound", "NAME", "bound of null collisions"},
-    KeyFlag{"--majorant-grid", "render.majorant_grid", "N", "cells along the longest axis of a grid of bounds"},
+    KeyFlag{"--spp", "render.spp", "N", "samples per pixel", false},
+    KeyFlag{"--seed", "render.seed", "S", "seed of the random numbers", true},
+    KeyFlag{"--max-depth", "render.max_depth", "N", "most scattering events on a path; -1: no limit", true},
+    KeyFlag{"--strategy", "render.strategy", "NAME", "distance sampling", false},
+    KeyFlag{"--transmittance", "render.transmittance", "NAME", "transmittance estimator", false},
+    KeyFlag{"--bound", "render.bound", "NAME", "bound of null collisions", false},
+    KeyFlag{"--majorant-grid", "render.majorant_grid", "N", "cells along the longest axis of a grid of bounds", true},
 };
 
 constexpr const char* overview =
@@ -132,6 +133,24 @@ void refuse_leftovers(const CLI::App& app, const CLI::App* top) {
                 throw UsageError("flag '" + name + "' belongs after the subcommand: clume " + sub->get_name() + " ... " + name);
         }
     throw UsageError(where + "unknown flag '" + name + "'; the nearest is '" + nearest_flag(name, flag_names(app)) + "'");
+}
+
+/// The arguments as a shell would take them again.
+std::string command_line(int argc, const char* const* argv) {
+    std::string line = "clume";
+    for (int i = 1; i < argc; ++i) {
+        const std::string word = argv[i];
+        const bool plain = !word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=.,:/%@") == std::string::npos;
+        line += ' ';
+        if (plain) {
+            line += word;
+            continue;
+        }
+        line += '\'';
+        for (const char c : word) line += c == '\'' ? std::string("'\\''") : std::string(1, c);
+        line += '\'';
+    }
+    return line;
 }
 
 RenderCommand check_render(RenderTexts texts, RenderCommand command) {
@@ -262,6 +281,35 @@ Command parse_command_line(int argc, const char* const* argv) {
     render->add_option("--stats-json", texts.stats_json, "write statistics; - is stdout (the paths then go to stderr)")
         ->type_name("FILE");
 
+    CLI::App* compare = app.add_subcommand("compare", "measure strategies against each other; writes a report")->allow_extras();
+    CompareTexts compare_texts;
+    compare->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    compare->add_option("SCENE", compare_texts.scene, "scene file (JSON, docs/scene.md)")->type_name("");
+    compare->add_option("-o,--output", compare_texts.output, "folder to write; default: the scene's name and _compare")->type_name("FOLDER");
+    compare->add_option("--strategies", compare_texts.strategies,
+                        "pairs strategy/estimator with commas, such as delta/ratio,march/march; a strategy alone: with every estimator; delta:scene, "
+                        "delta:grid, delta:tree: with that bound; default: all that fit")
+        ->type_name("LIST");
+    compare->add_option("--time", compare_texts.time_s, "equal time: seconds for each pair and seed")->type_name("SECONDS");
+    compare->add_option("--spp", compare_texts.spp, "1, 2, 4 ... N samples per pixel, or the counts given with commas; default: render.spp")
+        ->type_name("N|LIST");
+    compare->add_option("--seeds", compare_texts.seeds, "seeds for each pair; default 8")->type_name("N");
+    compare->add_option("--reference", compare_texts.reference, "image to measure against; default: made with two unbiased pairs")
+        ->type_name("FILE.exr");
+    compare->add_option("--device", compare_texts.devices, "id, part of a name, cpu, gpu or all; several with commas or repeated")
+        ->type_name("DEVICE")
+        ->take_all()
+        ->allow_extra_args(false);
+    std::vector<std::string> compare_definitions;
+    CLI::Option* compare_definition = compare->add_option("-D", compare_definitions, "override any key of the scene, such as -D film.width=256")
+                                          ->type_name("KEY=VALUE")
+                                          ->take_all()
+                                          ->allow_extra_args(false);
+    std::map<const CLI::Option*, const char*> compare_keys;
+    for (const KeyFlag& flag : key_flags)
+        if (flag.compare) compare_keys.emplace(compare->add_option(flag.flag)->description(help_of(flag))->type_name(flag.value), flag.key);
+    compare->add_flag("--quiet", compare_texts.quiet, "no progress on stderr");
+
     CLI::App* devices = app.add_subcommand("devices", "list the OpenCL devices of this machine")->allow_extras();
     std::string info_file;
     std::vector<std::string> info_definitions;
@@ -299,13 +347,19 @@ Command parse_command_line(int argc, const char* const* argv) {
         throw UsageError(text);
     }
     refuse_leftovers(app, nullptr);
-    for (const CLI::App* sub : {render, devices, info, bake})
+    for (const CLI::App* sub : {render, compare, devices, info, bake})
         if (sub->parsed()) refuse_leftovers(*sub, &app);
     if (app.get_subcommands().size() > 1) throw UsageError("one subcommand at a time");
 
     if (render->parsed()) {
         command.overrides = collect_overrides(*render, render_definition, keys);
         return check_render(std::move(texts), std::move(command));
+    }
+    if (compare->parsed()) {
+        CompareCommand compare_command = check_compare(compare_texts);
+        compare_command.overrides = collect_overrides(*compare, compare_definition, compare_keys);
+        compare_command.line = command_line(argc, argv);
+        return compare_command;
     }
     if (devices->parsed()) return DevicesCommand{};
     if (info->parsed()) {
@@ -318,7 +372,7 @@ Command parse_command_line(int argc, const char* const* argv) {
         out.quiet = bake_quiet;
         return out;
     }
-    throw UsageError("which subcommand? render, devices, info, bake or bench; see clume --help");
+    throw UsageError("which subcommand? render, compare, devices, info, bake or bench; see clume --help");
 }
 
 }  // namespace clume

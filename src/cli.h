@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "src/compare.h"
 #include "src/renderer.h"
 #include "src/scene_reader.h"
 
@@ -26,6 +27,15 @@ struct RenderCommand {
     std::optional<std::filesystem::path> stats_json;  ///< "-": stdout
 
     std::filesystem::path png() const { return std::filesystem::path(exr).replace_extension(".png"); }
+};
+
+struct CompareCommand {
+    std::filesystem::path scene;
+    std::filesystem::path folder;  ///< of the report
+    CompareOptions options;
+    std::vector<Override> overrides;
+    bool quiet = false;
+    std::string line;  ///< the command as typed, quoted for a shell
 };
 
 struct DevicesCommand {};
@@ -47,11 +57,23 @@ struct PrintCommand {
     std::string text;
 };
 
-using Command = std::variant<PrintCommand, RenderCommand, DevicesCommand, InfoCommand, BakeCommand>;
+using Command = std::variant<PrintCommand, RenderCommand, CompareCommand, DevicesCommand, InfoCommand, BakeCommand>;
 
 /// Throws UsageError with one line that names the nearest right flag or subcommand. `bench` is the caller's: its arguments
 /// are not parsed here.
 Command parse_command_line(int argc, const char* const* argv);
+
+/// What is typed after `compare`'s flags, before it is checked.
+struct CompareTexts {
+    std::string scene, output, strategies, spp, reference;
+    std::optional<double> time_s;
+    std::optional<int> seeds;
+    std::vector<std::string> devices;
+    bool quiet = false;
+};
+
+/// Throws UsageError.
+CompareCommand check_compare(const CompareTexts& texts);
 
 /// The name at the smallest edit distance (swapped neighbours count once), or at the smallest distance of its beginning
 /// plus one; empty without names.

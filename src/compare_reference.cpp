@@ -19,8 +19,13 @@ namespace {
 constexpr double wanted_share = 1.0 / 16;
 constexpr std::uint32_t least_samples = 64;  ///< of each half, so that its variance is well known
 
+/// The film squares samples in float: a variance below 2^-24 of the square (a sky that hardly changes inside a pixel) is lost in
+/// rounding, and is taken for that much.
 Reference reference_of(const RenderImage& image) {
-    return {image.film_width, image.film_height, {image.rgb.begin(), image.rgb.end()}, {image.variance.begin(), image.variance.end()}};
+    Reference r{image.film_width, image.film_height, {image.rgb.begin(), image.rgb.end()}, {image.variance.begin(), image.variance.end()}};
+    for (std::size_t i = 0; i < r.rgb.size(); ++i)
+        if (const std::uint32_t n = image.samples[i / 3]; n > 0) r.variance[i] += 0x1p-24 * r.rgb[i] * r.rgb[i] / n;
+    return r;
 }
 
 /// Unbiased pairs, the best second half for `first` in front: another strategy, then another estimator too.

@@ -68,7 +68,7 @@ void say_fastest(const Comparison& c, CompareSummary& s) {
 void say_cheapest_biased(const Comparison& c, CompareSummary& s) {
     double mean = c.reference.mean();
     for (std::size_t k = 0; k < c.pairs.size(); ++k) {
-        const bool biased = c.pairs[k].kind != BiasKind::unbiased || s.pairs[k].finding == Finding::biased;
+        const bool biased = c.pairs[k].kind == BiasKind::biased || s.pairs[k].finding == Finding::biased;
         if (s.pairs[k].last.rows == 0 || !biased) continue;
         if (!s.cheapest_biased || s.pairs[k].last.inverse_efficiency.mean < s.pairs[*s.cheapest_biased].last.inverse_efficiency.mean) s.cheapest_biased = k;
     }
@@ -89,7 +89,7 @@ void say_cheapest_biased(const Comparison& c, CompareSummary& s) {
         if (s.fastest_unbiased && p.test.rms > 0) {
             const double floor_s = s.pairs[*s.fastest_unbiased].last.inverse_efficiency.mean / (p.test.rms * p.test.rms);
             if (floor_s > 0)
-                text += fmt::format(" No number of samples takes its error below {:.2g}; {} is there after {:.2g} s.", p.test.rms,
+                text += fmt::format(" No number of samples takes its error below {:.2g}; {} is there after {:.3g} s.", p.test.rms,
                                     c.pairs[*s.fastest_unbiased].pair.label(), floor_s);
         }
     } else if (p.finding == Finding::no_bias_found) {
@@ -99,6 +99,21 @@ void say_cheapest_biased(const Comparison& c, CompareSummary& s) {
         text += ". Its bias takes at least two seeds to judge.";
     }
     s.verdict.push_back(text);
+}
+
+/// Of those whose bias goes away with the number of samples, and has.
+void say_consistent(const Comparison& c, CompareSummary& s) {
+    std::optional<std::size_t> best;
+    for (std::size_t k = 0; k < c.pairs.size(); ++k) {
+        if (c.pairs[k].kind != BiasKind::consistent || s.pairs[k].last.rows == 0 || s.pairs[k].finding == Finding::biased) continue;
+        if (!best || s.pairs[k].last.inverse_efficiency.mean < s.pairs[*best].last.inverse_efficiency.mean) best = k;
+    }
+    if (!best) return;
+    const LevelSummary& last = s.pairs[*best].last;
+    std::string text = fmt::format("Best consistent: {}. Its mse × seconds is {}", c.pairs[*best].pair.label(), with_interval(last.inverse_efficiency));
+    if (s.fastest_unbiased)
+        text += fmt::format(", {:.2f} times that of the fastest unbiased", last.inverse_efficiency.mean / s.pairs[*s.fastest_unbiased].last.inverse_efficiency.mean);
+    s.verdict.push_back(text + (s.pairs[*best].finding == Finding::no_bias_found ? "; no bias was found." : "."));
 }
 
 void say_reference(const Comparison& c, CompareSummary& s) {
@@ -168,6 +183,7 @@ CompareSummary summarise(const Comparison& c) {
     }
     say_fastest(c, s);
     say_cheapest_biased(c, s);
+    say_consistent(c, s);
     for (std::size_t k = 0; k < c.pairs.size(); ++k)
         if (s.pairs[k].finding == Finding::biased && c.pairs[k].kind == BiasKind::unbiased)
             s.verdict.push_back(fmt::format("{} should be unbiased but is not ({}; {:+.2g} % on the whole): please report this scene.", c.pairs[k].pair.label(),

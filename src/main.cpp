@@ -16,6 +16,8 @@
 #include "runtime/error.h"
 #include "src/bake.h"
 #include "src/cli.h"
+#include "src/compare.h"
+#include "src/compare_report.h"
 #include "src/error.h"
 #include "src/image_writer.h"
 #include "src/info.h"
@@ -131,6 +133,42 @@ int run(const RenderCommand& command) {
     std::fputs((command.exr.string() + "\n" + command.png().string() + "\n").c_str(), paths);
     if (command.stats_json) write_stats_json(*command.stats_json, stats);
     return report(stats);
+}
+
+int run(const CompareCommand& command) {
+    install_interrupt_handlers();
+    const Scene scene = read_scene(command.scene, command.overrides);
+    const bool fresh = prepare_report_folder(command.folder, command.line);
+    ProgressReporter progress(command.quiet);
+    Comparison comparison;
+    try {
+        comparison = compare(
+            scene, command.options, [&](const Progress& p) { progress.update(p); }, stop_requested());
+    } catch (...) {
+        if (fresh) discard_report_folder(command.folder);
+        throw;
+    }
+    progress.finish();
+    const CompareSummary summary = summarise(comparison);
+    std::vector<std::string> warnings = comparison.warnings;
+    bool failed = comparison.reference_refused();
+    std::size_t left_out = 0;
+    for (const PairRun& run : comparison.pairs) {
+        if (run.error.empty()) continue;
+        if (run.asked_for) warnings.push_back(run.pair.label() + " was left out: " + run.error);
+        else ++left_out;
+        failed = failed || run.asked_for;
+    }
+    if (left_out > 0) warnings.push_back(fmt::format("{} pairs could not run and were left out; the report says why", left_out));
+    for (std::string& warning : write_report(command.folder, comparison, summary, command.line)) warnings.push_back(std::move(warning));
+    for (const std::string& warning : warnings) say("warning: " + warning);
+    for (const std::string& sentence : summary.verdict) std::fputs((sentence + "\n").c_str(), stdout);
+    std::fputs(((command.folder / "index.html").string() + "\n").c_str(), stdout);
+    if (comparison.interrupted) {
+        say("interrupted: the report holds what was done");
+        return interrupted_exit_code;
+    }
+    return failed ? 1 : 0;
 }
 
 int run(const DevicesCommand&) {

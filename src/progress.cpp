@@ -54,14 +54,14 @@ std::string format_progress(const Progress& progress, std::optional<double> time
     const auto done = static_cast<double>(progress.paths_done), total = static_cast<double>(progress.paths_total);
     const double part = total > 0 ? std::clamp(done / total, 0.0, 1.0) : 0;
     double left_s = progress.mpaths_s > 0 ? (total - done) / (progress.mpaths_s * 1e6) : NAN;
-    if (progress.paths_done >= progress.paths_total) left_s = 0;
+    if (progress.paths_done >= progress.paths_total) left_s = progress.paths_total > 0 || progress.what.empty() ? 0 : NAN;
     if (time_limit_s) left_s = std::fmin(left_s, std::max(0.0, *time_limit_s - progress.elapsed_s));
 
     // From the most to the least important: what doesn't fit is left out from the right.
     const std::string percent = fmt::format("{:3.0f} %", std::floor(100 * part));
     const std::string fields[] = {fmt::format("  {} left", format_duration(left_s)), progress.what.empty() ? "" : "  " + progress.what,
                                   fmt::format("  {:.3g} Mpaths/s", progress.mpaths_s),
-                                  fmt::format("  {} of {} samples", format_count(done), format_count(total))};
+                                  fmt::format("  {} of {} samples", format_count(done), total > 0 ? format_count(total) : "?")};
     std::string line = percent;
     for (const std::string& field : fields)
         if (width <= 0 || line.size() + field.size() <= static_cast<std::size_t>(width)) line += field;
