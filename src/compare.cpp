@@ -25,6 +25,7 @@ constexpr int most_time_levels = 7;
 struct Live {
     struct Shot {
         std::size_t level = SIZE_MAX;
+        std::uint32_t spp = 0;
         std::vector<float> image, variance;
     };
     Accumulation film;
@@ -183,7 +184,7 @@ void Comparer::add_row(std::size_t k, std::size_t level, Live& live) {
     row.errors = image_errors(result.image.rgb, out_.reference);
     live.row = out_.rows.size();
     live.before = std::move(live.last);
-    live.last = {level, std::move(result.image.rgb), std::move(result.image.variance)};
+    live.last = {level, row.spp, std::move(result.image.rgb), std::move(result.image.variance)};
     out_.rows.push_back(row);
     PairRun& run = out_.pairs[run_of_[k]];
     run.nonfinite_samples = std::max(run.nonfinite_samples, result.stats.nonfinite_samples);
@@ -208,6 +209,7 @@ void Comparer::commit(std::vector<Live>& live, std::size_t level) {
             run.image[i] = (run.image[i] * n + static_cast<double>(shot.image[i])) / (n + 1);
             run.variance[i] = (run.variance[i] * n * n + static_cast<double>(shot.variance[i])) / ((n + 1) * (n + 1));
         }
+        run.samples += shot.spp;
         run.tiles.push_back(tiles.differences(shot.image, out_.reference));
     }
 }

@@ -50,6 +50,7 @@ struct PairRun {
     std::vector<float> cost;             ///< per pixel: primitive tests of one path
     std::vector<double> image, variance; ///< at the level of the images: mean over seeds, variance of that mean
     std::vector<std::vector<double>> tiles;  ///< per seed: Tiles::differences of its image at that level
+    std::uint64_t samples = 0;           ///< per pixel, in all of these images
     std::uint64_t nonfinite_samples = 0, bound_violations = 0;
 };
 

@@ -22,9 +22,13 @@ constexpr std::uint32_t least_samples = 64;  ///< of each half, so that its vari
 /// The film squares samples in float: a variance below 2^-24 of the square (a sky that hardly changes inside a pixel) is lost in
 /// rounding, and is taken for that much.
 Reference reference_of(const RenderImage& image) {
-    Reference r{image.film_width, image.film_height, {image.rgb.begin(), image.rgb.end()}, {image.variance.begin(), image.variance.end()}};
+    Reference r{image.film_width, image.film_height, {image.rgb.begin(), image.rgb.end()}, {image.variance.begin(), image.variance.end()}, {}};
+    r.sample_variance.resize(r.rgb.size());
     for (std::size_t i = 0; i < r.rgb.size(); ++i)
-        if (const std::uint32_t n = image.samples[i / 3]; n > 0) r.variance[i] += 0x1p-24 * r.rgb[i] * r.rgb[i] / n;
+        if (const std::uint32_t n = image.samples[i / 3]; n > 0) {
+            r.variance[i] += 0x1p-24 * r.rgb[i] * r.rgb[i] / n;
+            r.sample_variance[i] = r.variance[i] * n;
+        }
     return r;
 }
 
@@ -120,6 +124,7 @@ void make_reference(const Scene& scene, const CompareOptions& options, std::vect
     for (std::size_t i = 0; i < a.rgb.size(); ++i) {
         out.reference.rgb[i] = 0.5 * (a.rgb[i] + b.rgb[i]);
         out.reference.variance[i] = 0.25 * (a.variance[i] + b.variance[i]);
+        out.reference.sample_variance[i] = 0.5 * (a.sample_variance[i] + b.sample_variance[i]);
     }
 }
 

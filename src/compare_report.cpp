@@ -162,11 +162,8 @@ void Writer::write_pairs() {
         const std::string name = run.pair.file_name();
         PairPictures& p = pictures_.pairs[k];
         if (!run.image.empty()) {
-            double samples = 0;
-            for (const CompareRow& row : c_.rows)
-                if (row.pair == k && row.level == c_.level) samples += row.spp;
             write_exr(folder_ / pairs / (name + ".exr"),
-                      as_image(run.image, run.variance, c_.width, c_.height, static_cast<std::uint32_t>(std::min(samples, 4294967295.0))), metadata(run.pair.label()));
+                      as_image(run.image, run.variance, c_.width, c_.height, static_cast<std::uint32_t>(std::min<std::uint64_t>(run.samples, UINT32_MAX))), metadata(run.pair.label()));
             p.image = keep(pairs / (name + ".png"), tone_mapped(run.image, c_.width, c_.height, facts_.exposure_stops));
             p.error = keep(pairs / (name + "_error.png"), error_map(signed_errors(run.image, c_.reference.rgb), c_.width, c_.height, facts_.error_scale));
         }

@@ -29,18 +29,19 @@ Moments moments(std::size_t count, const Get& get) {
     return m;
 }
 
-/// Variance of a mean over seeds with a shared error, and its Welch degrees of freedom.
+/// Variance of a mean over seeds with a shared error, and its Welch degrees of freedom; the seeds' part is at least `floor`.
 struct Error {
-    double variance, degrees;
-    Error(const Moments& m, double shared) : variance(m.variance / m.count + shared), degrees(infinity) {
-        const double own = m.variance / m.count;
+    double variance, degrees = infinity;
+    Error(const Moments& m, double shared, double floor = 0) {
+        const double own = std::max(m.variance / m.count, floor);
+        variance = own + shared;
         if (own > 0) degrees = (m.count - 1) * (variance / own) * (variance / own);
     }
 };
 
 /// Student's p for a mean of 0, or NaN where there is nothing to test: no scatter, and no difference but rounding.
-double p_of_mean(const Moments& m, double shared, double rounding) {
-    const Error e(m, shared);
+double p_of_mean(const Moments& m, double shared, double floor, double rounding) {
+    const Error e(m, shared, floor);
     if (e.variance <= 0 && std::abs(m.mean) <= rounding) return NAN;
     return student_p(m.mean / std::sqrt(e.variance + rounding * rounding), e.degrees);
 }
@@ -168,32 +169,36 @@ std::vector<double> Tiles::differences(std::span<const float> rgb, const Referen
     return tile_sums(*this, 1, [&](std::size_t i) { return static_cast<double>(rgb[i]) - reference.rgb[i]; });
 }
 
-std::vector<double> Tiles::variances(const Reference& reference) const {
-    return tile_sums(*this, 2, [&](std::size_t i) { return reference.variance[i]; });
+std::vector<double> Tiles::means(std::span<const double> values) const {
+    return tile_sums(*this, 1, [&](std::size_t i) { return values[i]; });
 }
 
-std::vector<double> Tiles::means(const Reference& reference) const {
-    return tile_sums(*this, 1, [&](std::size_t i) { return reference.rgb[i]; });
+std::vector<double> Tiles::variances(std::span<const double> values) const {
+    return tile_sums(*this, 2, [&](std::size_t i) { return values[i]; });
 }
 
-BiasTest test_bias(const std::vector<std::vector<double>>& seeds, const Reference& reference, const Tiles& tiles) {
+BiasTest test_bias(const std::vector<std::vector<double>>& seeds, double samples, const Reference& reference, const Tiles& tiles) {
     BiasTest result;
     if (seeds.size() < 2) return result;
     result.tested = true;
-    const std::vector<double> shared = tiles.variances(reference), level = tiles.means(reference), pixels = pixels_per_tile(tiles);
+    const std::vector<double> shared = tiles.variances(reference.variance), level = tiles.means(reference.rgb), pixels = pixels_per_tile(tiles);
+    std::vector<double> floor(shared.size());
+    if (!reference.sample_variance.empty() && samples > 0) floor = tiles.variances(reference.sample_variance);
+    for (double& v : floor) v /= std::max(1.0, samples);
     const double all_pixels = static_cast<double>(tiles.width) * tiles.height;
     constexpr double float_rounding = 3e-7;
     double square = 0;
     for (std::size_t c = 0; c < 3; ++c) {
         const std::size_t first = c * tiles.count();
-        double fisher = 0, tested = 0, least = 1, shared_mean = 0, mean_level = 0;
+        double fisher = 0, tested = 0, least = 1, shared_mean = 0, floor_mean = 0, mean_level = 0;
         for (std::size_t k = first; k < first + tiles.count(); ++k) {
             const double share = pixels[k - first] / all_pixels;
             shared_mean += shared[k] * share * share;
+            floor_mean += floor[k] * share * share;
             mean_level += std::abs(level[k]) * share;
             const Moments m = moments(seeds.size(), [&](std::size_t s) { return seeds[s][k]; });
             square += share * (m.mean * m.mean - Error(m, shared[k]).variance) / 3;
-            const double p = p_of_mean(m, shared[k], float_rounding * std::abs(level[k]));
+            const double p = p_of_mean(m, shared[k], floor[k], float_rounding * std::abs(level[k]));
             if (std::isnan(p)) continue;
             fisher -= 2 * std::log(std::max(p, 1e-300));
             ++tested;
@@ -204,7 +209,7 @@ BiasTest test_bias(const std::vector<std::vector<double>>& seeds, const Referenc
             for (std::size_t k = 0; k < tiles.count(); ++k) sum += seeds[s][first + k] * pixels[k] / all_pixels;
             return sum;
         });
-        const double p = p_of_mean(whole, shared_mean, float_rounding * mean_level);
+        const double p = p_of_mean(whole, shared_mean, floor_mean, float_rounding * mean_level);
         if (!std::isnan(p)) result.p_mean = std::min(result.p_mean, p);
         if (tested > 0) result.p_worst_tile = std::min(result.p_worst_tile, sidak(least, tested));
         result.p_all_tiles = std::min(result.p_all_tiles, chi_square_p(fisher, 2 * tested));

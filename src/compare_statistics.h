@@ -13,6 +13,7 @@ namespace clume {
 struct Reference {
     int width = 0, height = 0;
     std::vector<double> rgb, variance;
+    std::vector<double> sample_variance;  ///< of one sample of an unbiased pair; empty if not known
 
     double mean() const;           ///< over pixels and channels
     double mean_variance() const;  ///< likewise
@@ -51,22 +52,24 @@ struct Tiles {
     std::size_t count() const { return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows); }
     /// Mean of (x − r) per tile and channel, channel by channel: 3 · count() values.
     std::vector<double> differences(std::span<const float> rgb, const Reference& reference) const;
-    /// Variance of the reference's tile means, in the same order, and the tile means themselves.
-    std::vector<double> variances(const Reference& reference) const;
-    std::vector<double> means(const Reference& reference) const;
+    /// In the same order, the mean of given values per pixel and channel, and the variance of a mean of such variances.
+    std::vector<double> means(std::span<const double> values) const;
+    std::vector<double> variances(std::span<const double> variances) const;
 };
 
 /// Is the mean image another than the reference? Three questions per channel, each a Welch-Student test over the seeds with
 /// the reference's variance added: the mean of the image; the worst tile (Šidák over tiles); all tiles together (Fisher's
 /// sum of −2 ln p against χ²), which finds a bias that changes its sign over the image. `p` is Šidák over all nine.
+/// The scatter over the seeds may miss what is rare (a tile where nothing happened in any seed): the variance of their mean is
+/// taken for no less than the reference's samples say, reference.sample_variance over `samples`.
 struct BiasTest {
     double p = 1;
     double p_mean = 1, p_worst_tile = 1, p_all_tiles = 1;  ///< least over the channels
     double rms = 0;      ///< root of the mean squared bias of tiles, noise taken off: a lower bound of the error's floor
     bool tested = false; ///< false with fewer than two seeds
 };
-/// `seeds`: Tiles::differences of each seed's image.
-BiasTest test_bias(const std::vector<std::vector<double>>& seeds, const Reference& reference, const Tiles& tiles);
+/// `seeds`: Tiles::differences of each seed's image; `samples`: per pixel, in all seeds together.
+BiasTest test_bias(const std::vector<std::vector<double>>& seeds, double samples, const Reference& reference, const Tiles& tiles);
 
 /// Do two images of independent noise have one mean? z per pixel and channel (pixels join their followers until both sides
 /// hold 100 effective contributions, mean²/variance, which keeps sums near normal), Šidák over all; χ² of the z² of tiles of

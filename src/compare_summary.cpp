@@ -170,7 +170,7 @@ CompareSummary summarise(const Comparison& c) {
         PairSummary& p = s.pairs[k];
         p.last = summarise(c, k, c.level);
         if (p.last.rows == 0) continue;
-        p.test = test_bias(c.pairs[k].tiles, c.reference, Tiles(c.width, c.height));
+        p.test = test_bias(c.pairs[k].tiles, static_cast<double>(c.pairs[k].samples), c.reference, Tiles(c.width, c.height));
         p.finding = p.test.tested ? Finding::no_bias_found : Finding::untested;
         tested += p.test.tested;
     }

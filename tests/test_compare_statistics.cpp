@@ -21,7 +21,7 @@ public:
 
     template <class Factor>
     Reference image(double samples, const Factor& factor) {
-        Reference r{width, height, {}, {}};
+        Reference r{width, height, {}, {}, {}};
         std::gamma_distribution<double> sum(samples);
         for (int y = 0; y < height; ++y)
             for (int x = 0; x < width; ++x) {
@@ -29,6 +29,7 @@ public:
                 for (int c = 0; c < 3; ++c) {
                     r.rgb.push_back(value);
                     r.variance.push_back(value * value / samples);
+                    r.sample_variance.push_back(value * value);
                 }
             }
         return r;
@@ -50,14 +51,14 @@ BiasTest bias_of(Simulation& simulation, const Factor& factor) {
     const Tiles tiles(width, height);
     std::vector<std::vector<double>> seeds;
     for (int s = 0; s < 8; ++s) seeds.push_back(tiles.differences(floats(simulation.image(16, factor)), reference));
-    return test_bias(seeds, reference, tiles);
+    return test_bias(seeds, 8 * 16, reference, tiles);
 }
 
 }  // namespace
 
 TEST_CASE("CompareStatistics.ErrorsByHand", "[quick]") {
     // Two pixels; differences 1, 0, 0 and 0, −2, 4; mean of the reference 2, so 0.01 · 2² = 0.04.
-    const Reference reference{2, 1, {1, 2, 3, 0, 4, 2}, {0.6, 0, 0, 0, 0, 0}};
+    const Reference reference{2, 1, {1, 2, 3, 0, 4, 2}, {0.6, 0, 0, 0, 0, 0}, {}};
     const std::vector<float> image{2, 2, 3, 0, 2, 6};
     const ImageErrors e = image_errors(image, reference);
     CHECK(e.mse == Approx((1 + 4 + 16) / 6.0 - 0.1));
@@ -65,7 +66,7 @@ TEST_CASE("CompareStatistics.ErrorsByHand", "[quick]") {
     CHECK(e.relmse == Approx((1 / 1.04 + 4 / 16.04 + 16 / 4.04) / 6));
     // Standard deviations √0.6, 0, 0: fully correlated channels give (√0.6 / 3)² for the pixel, halved twice for the image.
     CHECK(reference.variance_of_mean() == Approx(0.6 / 9 / 4));
-    const Reference black{1, 1, {0, 0, 0}, {0, 0, 0}};
+    const Reference black{1, 1, {0, 0, 0}, {0, 0, 0}, {}};
     CHECK(image_errors(std::vector<float>{0, 0, 0}, black).relmse == 0);
 }
 
@@ -112,6 +113,37 @@ TEST_CASE("CompareStatistics.NoBiasIsRarelyFoundWhereThereIsNone") {
     CHECK(found <= 0.09 * trials);  // 5 % and 3.2 standard deviations
 }
 
+TEST_CASE("CompareStatistics.RareEventsAreNoBias") {
+    // Every sample is 1, or 0 with a chance of 1 in 1000: two seeds of two samples see none in most tiles, and so no scatter.
+    std::mt19937_64 random(5);
+    const auto image = [&](int samples) {
+        std::binomial_distribution<int> lost(samples, 0.001);
+        Reference r{width, height, {}, {}, {}};
+        for (int i = 0; i < width * height; ++i) {
+            const double value = 1 - lost(random) / static_cast<double>(samples), variance = value * (1 - value);
+            for (int c = 0; c < 3; ++c) {
+                r.rgb.push_back(value);
+                r.variance.push_back(variance / samples);
+                r.sample_variance.push_back(variance);
+            }
+        }
+        return r;
+    };
+    const Tiles tiles(width, height);
+    int found = 0;
+    constexpr int trials = 100;
+    for (int t = 0; t < trials; ++t) {
+        const Reference reference = image(512);
+        const std::vector<std::vector<double>> seeds{tiles.differences(floats(image(2)), reference), tiles.differences(floats(image(2)), reference)};
+        found += test_bias(seeds, 4, reference, tiles).p < 0.05;
+        Reference without = reference;
+        without.sample_variance.clear();
+        REQUIRE(test_bias(seeds, 4, without, tiles).p < 1e-3);  // the trap that the floor is for
+    }
+    INFO(found);
+    CHECK(found <= 0.12 * trials);
+}
+
 TEST_CASE("CompareStatistics.BiasOfEveryShapeIsFound", "[quick]") {
     Simulation simulation(3);
     const BiasTest everywhere = bias_of(simulation, [](int, int) { return 1.03; });
@@ -129,17 +161,17 @@ TEST_CASE("CompareStatistics.BiasOfEveryShapeIsFound", "[quick]") {
     const BiasTest spot = bias_of(simulation, [](int x, int y) { return x < 8 && y < 8 ? 1.5 : 1.0; });
     CHECK(spot.p < 0.01);
     CHECK(spot.p_worst_tile < 1e-3);
-    CHECK_FALSE(test_bias({}, simulation.image(4), Tiles(width, height)).tested);
+    CHECK_FALSE(test_bias({}, 0, simulation.image(4), Tiles(width, height)).tested);
 }
 
 TEST_CASE("CompareStatistics.ExactPixelsAreNoEvidence", "[quick]") {
     // A background without noise agrees to rounding in every seed, and one that differs is found without any scatter.
-    Reference exact{16, 16, std::vector<double>(768, 0.7), std::vector<double>(768, 0.0)};
+    Reference exact{16, 16, std::vector<double>(768, 0.7), std::vector<double>(768, 0.0), {}};
     const Tiles tiles(16, 16);
     std::vector<float> image(768, 0.7f);
-    CHECK(test_bias(std::vector(8, tiles.differences(image, exact)), exact, tiles).p == 1);
+    CHECK(test_bias(std::vector(8, tiles.differences(image, exact)), 8, exact, tiles).p == 1);
     image.assign(768, 0.71f);
-    CHECK(test_bias(std::vector(8, tiles.differences(image, exact)), exact, tiles).p < 1e-6);
+    CHECK(test_bias(std::vector(8, tiles.differences(image, exact)), 8, exact, tiles).p < 1e-6);
 }
 
 TEST_CASE("CompareStatistics.AgreementAcceptsEqualMeansAndRefusesOthers") {
@@ -168,7 +200,7 @@ TEST_CASE("CompareStatistics.TilesCoverTheImageOnce", "[quick]") {
         CHECK(tiles.rows <= 16);
         // A difference of 1 everywhere is 1 in every tile, whatever its size.
         const auto values = 3 * static_cast<std::size_t>(w) * static_cast<std::size_t>(h);
-        const Reference zero{w, h, std::vector<double>(values), std::vector<double>(values)};
+        const Reference zero{w, h, std::vector<double>(values), std::vector<double>(values), {}};
         for (const double d : tiles.differences(std::vector<float>(values, 1.0f), zero)) REQUIRE(d == Approx(1));
     }
 }
