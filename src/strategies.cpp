@@ -24,7 +24,7 @@ constexpr std::array estimator_table{
     Method{"analytic", B::unbiased, true, true, false, "exact: exp of minus the summed optical depths"},
     Method{"ratio", B::unbiased, true, true, true, "product of the null collisions' shares"},
     Method{"residual-ratio", B::unbiased, true, true, true, "as ratio, over what a control extinction leaves"},
-    Method{"binary", B::unbiased, true, false, false, "a flight that either reaches the light or does not"},
+    Method{"binary", B::unbiased, true, true, false, "a flight that either reaches the light or does not"},
     Method{"march", B::biased, true, true, false, "fixed steps, extinction constant inside one"},
 };
 
