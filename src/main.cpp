@@ -23,6 +23,7 @@
 #include "src/info.h"
 #include "src/interrupt.h"
 #include "src/output_file.h"
+#include "src/pilot.h"
 #include "src/progress.h"
 #include "src/renderer.h"
 #include "src/scene_reader.h"
@@ -65,6 +66,7 @@ ImageMetadata describe(const Scene& scene, const RenderCommand& command, const R
         {"maxDepth", std::to_string(scene.render.max_depth)},
         {"strategy", stats.strategy},
         {"transmittance", stats.transmittance},
+        {"bound", stats.bound},
         {"devices", join(devices, "; ")},
         {"deviceVersions", join(drivers, "; ")},
         {"layoutHash", stats.layout_hash},
@@ -79,8 +81,10 @@ ImageMetadata describe(const Scene& scene, const RenderCommand& command, const R
     return metadata;
 }
 
-void print_explanation(const Scene& scene, const RenderOptions& options) {
-    const auto table = explain(scene, options);
+void print_explanation(const Scene& scene, const RenderOptions& options, const std::optional<Pilot>& pilot) {
+    auto table = explain(scene, options);
+    if (pilot)
+        for (auto& line : pilot->table()) table.push_back(std::move(line));
     std::size_t width = 0;
     for (const auto& [feature, what] : table) width = std::max(width, feature.size());
     for (const auto& [feature, what] : table) std::fputs(fmt::format("{:<{}}  {}\n", feature, width, what).c_str(), stderr);
@@ -89,7 +93,8 @@ void print_explanation(const Scene& scene, const RenderOptions& options) {
 /// Says what is to be known about the render; the exit code.
 int report(const RenderStats& stats) {
     for (const std::string& warning : stats.warnings) say("warning: " + warning);
-    for (const std::string& note : stats.notes) say(note);
+    if (stats.strategy == "progressive")
+        for (const std::string& note : stats.notes) say(note);
     if (stats.bound_violations > 0 && stats.strategy != "progressive")
         say(fmt::format("warning: density above its bound {} times: the image may be wrong", stats.bound_violations));
     if (stats.nonfinite_samples > 0)
@@ -109,17 +114,24 @@ int run(const RenderCommand& command) {
     if (command.stats_json && !json_on_stdout) check_writable(*command.stats_json);
     install_interrupt_handlers();
 
-    const Scene scene = read_scene(command.scene, command.overrides);
+    Scene scene = read_scene(command.scene, command.overrides);
     if (const auto& crop = command.options.crop; crop && (crop->x1 > scene.film.width || crop->y1 > scene.film.height))
         throw UsageError(fmt::format("--crop {},{},{},{}: reaches beyond the film, which is {} x {}", crop->x0, crop->y0,
                                      crop->x1, crop->y1, scene.film.width, scene.film.height));
-    if (command.explain) print_explanation(scene, command.options);
+    const std::optional<Pilot> pilot = run_pilot(scene, command.options, stop_requested());
+    if (pilot) scene = with_pair(std::move(scene), pilot->rows[pilot->chosen].pair);
+    if (command.explain) print_explanation(scene, command.options, pilot);
 
     ProgressReporter progress(command.quiet, command.options.time_limit_s);
     RenderResult result = render(
         scene, command.options, [&](const Progress& p) { progress.update(p); }, stop_requested());
     progress.finish();
-    const RenderStats& stats = result.stats;
+    RenderStats& stats = result.stats;
+    if (pilot) {
+        stats.notes.push_back(pilot->summary());
+        const auto table = pilot->table();
+        stats.explain.insert(stats.explain.end(), table.begin(), table.end());
+    }
     if (stats.samples_max == 0 && (stats.interrupted || stop_requested())) {
         say("interrupted before the first sample: nothing was written");
         return interrupted_exit_code;

@@ -240,6 +240,7 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     RenderStats& stats = impl_->setup;
     stats.strategy = device.strategy;
     stats.transmittance = device.transmittance;
+    stats.bound = device.bound;
     stats.primitives = device.ellipsoids.size();
     stats.device_bytes = device.byte_size();
     stats.layout_hash = device.hash();
@@ -248,6 +249,11 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     check_memory(scene, device, devices);
 
     impl_->pixels = active_pixels(scene, device, impl_->window);
+    if (const std::size_t n = impl_->pixels.size(); o.most_pixels > 0 && n > o.most_pixels) {
+        std::vector<device::uint> some;
+        for (std::size_t i = 0; i < o.most_pixels; ++i) some.push_back(impl_->pixels[i * n / o.most_pixels]);
+        impl_->pixels = std::move(some);
+    }
     impl_->tiles = make_tiles(impl_->pixels.size(), devices);
     stats.empty_pixels = impl_->all_pixels() - impl_->pixels.size();
     const bool grey = std::find(device.defines.begin(), device.defines.end(), std::pair<std::string, std::string>("CLUME_CHANNELS", "1")) != device.defines.end();
@@ -261,6 +267,7 @@ Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
 Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 const RenderStats& Renderer::setup() const { return impl_->setup; }
+std::uint32_t Renderer::rendered_pixels() const { return static_cast<std::uint32_t>(impl_->pixels.size()); }
 
 Accumulation Renderer::start(std::uint64_t seed, std::uint32_t begin) const {
     return Accumulation(std::unique_ptr<Accumulation::State>(

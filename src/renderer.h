@@ -32,6 +32,7 @@ struct RenderOptions {
     std::optional<double> time_limit_s;        ///< stop handing out batches after this long; the image holds what was done
     std::uint32_t batch_samples = 0;           ///< samples of a pixel per batch; 0: sized to 100–200 ms by measurement
     int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own
+    std::uint32_t most_pixels = 0;             ///< > 0: at most so many of the pixels that meet something, spread over them
     bool count_work = false;                   ///< count operations (stats.work, image.tests): costs a few per cent of speed
     std::string accelerator = "auto";          ///< of what visits chords (decomposition, analytic, march): "cells", "bvh" or "auto"
 };
@@ -58,7 +59,7 @@ struct DeviceShare {
 };
 
 struct RenderStats {
-    std::string strategy, transmittance;       ///< what `auto` became
+    std::string strategy, transmittance, bound;  ///< what `auto` became
     std::vector<DeviceShare> devices;
     std::uint64_t paths = 0;                   ///< samples × pixels of the window
     std::uint64_t empty_pixels = 0;            ///< proven empty, or of constant background: cost nothing
@@ -140,6 +141,8 @@ public:
 
     /// What is known before the first path: names that `auto` became, build and compile times, sizes, explanation.
     const RenderStats& setup() const;
+    /// Pixels that paths are traced for; the others are known.
+    std::uint32_t rendered_pixels() const;
 
 private:
     struct Impl;

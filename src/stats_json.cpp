@@ -73,6 +73,7 @@ std::string stats_to_json(const RenderStats& stats) {
     put_member(out, "version", std::string(CLUME_VERSION));
     put_member(out, "strategy", stats.strategy);
     put_member(out, "transmittance", stats.transmittance);
+    put_member(out, "bound", stats.bound);
     put_member(out, "devices", stats.devices);
     put_member(out, "paths", stats.paths);
     put_member(out, "empty_pixels", stats.empty_pixels);

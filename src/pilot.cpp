@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+#include "src/pilot.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <fmt/format.h>
+#include <sstream>
+
+#include "runtime/hash.h"
+#include "runtime/program_cache.h"
+#include "src/device_lights.h"
+#include "src/device_scene.h"
+#include "src/error.h"
+#include "src/work_weights.h"
+
+namespace clume {
+namespace {
+
+constexpr std::uint32_t kPixels = 1024;     ///< at most
+constexpr std::uint32_t kSamples = 16;      ///< of each
+constexpr std::uint32_t kFirstSample = 0xc0000000u;  ///< numbers of their own: the image's noise is not what was chosen by
+constexpr std::size_t kFewPrimitives = 64;  ///< up to which one bound for the whole scene may be the cheapest
+constexpr int kVersion = 1;                 ///< of the candidates and of how they are measured
+
+/// `pixels` becomes the number rendered.
+PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const std::atomic<bool>& stop, std::uint32_t& pixels) {
+    PilotRow row{pair, 0, 0, {}};
+    try {
+        RenderOptions o = options;
+        o.count_work = true;
+        o.crop.reset();
+        o.most_pixels = kPixels;
+        Renderer renderer(with_pair(scene, pair), o);
+        Accumulation film = renderer.start(scene.render.seed, kFirstSample);
+        pixels = renderer.rendered_pixels();
+        renderer.extend(film, kFirstSample + kSamples, {{}, &stop, {}});
+        if (pixels == 0 || stop.load()) return row;
+        const RenderResult r = renderer.result(film);
+        for (std::size_t k = 0; k < WORK_KINDS; ++k) row.work_ns += work_weights_ns[k] * static_cast<double>(r.stats.work[k]);
+        for (const float v : r.image.variance) row.variance += static_cast<double>(v);
+        const double paths = static_cast<double>(pixels) * kSamples;
+        row.work_ns = (row.work_ns + 100 * paths) / paths;  // and a hundred for the path itself
+        row.variance *= kSamples / (3.0 * static_cast<double>(pixels));
+    } catch (const RenderError& e) {
+        row.error = e.what();
+    }
+    return row;
+}
+
+std::size_t best_of(const std::vector<PilotRow>& rows) {
+    std::size_t best = rows.size();
+    for (std::size_t i = 0; i < rows.size(); ++i)
+        if (rows[i].error.empty() && (best == rows.size() || rows[i].inverse_efficiency() < rows[best].inverse_efficiency())) best = i;
+    return best;
+}
+
+/// No rows if there is nothing to measure.
+Pilot measure_all(const Scene& scene, const RenderOptions& options, const std::atomic<bool>& stop) {
+    Pilot pilot;
+    pilot.spp = kSamples;
+    const std::string estimator = scene.render.transmittance == "auto" ? "analytic" : scene.render.transmittance;
+    std::vector<MethodPair> candidates;
+    std::size_t primitives = 0;
+    for (const auto& m : scene.media) primitives += m.primitives.size();
+    for (const Method& s : strategies()) {
+        if (s.kind != BiasKind::unbiased || !fits(s, scene)) continue;
+        if (!s.null_collisions) candidates.push_back({s.name, estimator});
+        else
+            for (const char* bound : bounds()) {
+                if (scene.render.bound != "auto" && scene.render.bound != bound) continue;
+                if (scene.render.majorant_grid && scene.render.bound == "auto" && std::string_view(bound) != "grid") continue;
+                if (std::string_view(bound) == "scene" && primitives > kFewPrimitives && scene.render.bound == "auto") continue;
+                candidates.push_back({s.name, estimator, bound});
+            }
+    }
+    // Distances drawn by unbiased strategies have one distribution: what tells them apart is work, whatever the estimator.
+    for (const MethodPair& pair : candidates) {
+        pilot.rows.push_back(measure(scene, options, pair, stop, pilot.pixels));
+        if (stop.load() || (pilot.rows.back().error.empty() && pilot.pixels == 0)) return {};
+    }
+    double variance = 0, measured = 0;
+    for (const PilotRow& row : pilot.rows)
+        if (row.error.empty()) variance += row.variance, measured += 1;
+    if (measured == 0) throw RenderError(fmt::format("{}: no strategy could be tried: {}", scene.path, pilot.rows.front().error));
+    for (PilotRow& row : pilot.rows)
+        if (row.error.empty()) row.variance = variance / measured;
+    pilot.chosen = best_of(pilot.rows);
+    if (scene.render.transmittance != "auto" || !samples_lights(scene)) return pilot;
+    const MethodPair winner = pilot.rows[pilot.chosen].pair;
+    for (const Method& e : estimators())
+        if (e.kind == BiasKind::unbiased && e.name != estimator && fits(e, scene)) pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, stop, pilot.pixels));
+    if (stop.load()) return {};
+    pilot.chosen = best_of(pilot.rows);
+    return pilot;
+}
+
+std::string to_text(const Pilot& pilot) {
+    std::string text = fmt::format("{} {} {} {}\n", pilot.chosen, pilot.pixels, pilot.spp, pilot.rows.size());
+    for (const PilotRow& r : pilot.rows) text += fmt::format("{} {} {} {:.17g} {:.17g}\n", r.pair.strategy, r.pair.estimator, r.pair.bound, r.variance, r.work_ns);
+    return text;
+}
+
+std::optional<Pilot> from_text(const std::string& text) {
+    std::istringstream in(text);
+    Pilot pilot;
+    std::size_t rows = 0;
+    if (!(in >> pilot.chosen >> pilot.pixels >> pilot.spp >> rows) || rows > 64) return std::nullopt;
+    for (std::size_t i = 0; i < rows; ++i) {
+        PilotRow r;
+        if (!(in >> r.pair.strategy >> r.pair.estimator >> r.pair.bound >> r.variance >> r.work_ns)) return std::nullopt;
+        if (!find_strategy(r.pair.strategy) || !find_estimator(r.pair.estimator)) return std::nullopt;
+        pilot.rows.push_back(std::move(r));
+    }
+    if (pilot.chosen >= pilot.rows.size()) return std::nullopt;
+    return pilot;
+}
+
+}  // namespace
+
+std::string Pilot::summary() const {
+    return fmt::format("auto chose {} by a pilot of {} x {} paths", rows[chosen].pair.label(), pixels, spp);
+}
+
+std::vector<std::pair<std::string, std::string>> Pilot::table() const {
+    std::vector<std::pair<std::string, std::string>> lines;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        const PilotRow& r = rows[i];
+        const std::string what = r.error.empty() ? fmt::format("variance {:.4g}, work {:.0f} ns per path, inverse efficiency {:.4g}{}", r.variance, r.work_ns, r.inverse_efficiency(), i == chosen ? "  <- chosen" : "")
+                                                 : "not measured: " + r.error;
+        lines.emplace_back("pilot " + r.pair.label(), what);
+    }
+    return lines;
+}
+
+std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options, const std::atomic<bool>& stop) {
+    if (scene.render.strategy != "auto") return std::nullopt;
+    if (scene.media.empty() && scene.grids.empty()) return std::nullopt;
+    // One device is enough, and which one makes no difference.
+    RenderOptions one = options;
+    one.cpu_split = 0;
+    one.batch_samples = 0;
+    const DeviceScene device = make_device_scene(with_pair(scene, {"delta", "analytic"}), one);
+    if (device.ellipsoids.empty() && device.grids.empty()) return std::nullopt;
+    std::string key = fmt::format("pilot {} {} seed {} {} {} {}", kVersion, device.hash(), scene.render.seed, scene.render.transmittance, scene.render.bound, scene.render.majorant_grid.value_or(0));
+    for (const double w : work_weights_ns) key += fmt::format(" {}", w);
+    for (const auto& [name, value] : device.defines) key += " " + name + "=" + value;
+    key = sha256_hex(key);
+    const std::filesystem::path cache = program_cache_folder();
+    const std::filesystem::path folder = cache.empty() ? cache : cache / "pilots";
+    if (!folder.empty())
+        if (const auto bytes = load_binary(folder, key))
+            if (auto pilot = from_text(std::string(bytes->begin(), bytes->end()))) return pilot;
+    Pilot pilot = measure_all(scene, one, stop);
+    if (pilot.rows.empty()) return std::nullopt;
+    const bool complete = std::all_of(pilot.rows.begin(), pilot.rows.end(), [](const PilotRow& r) { return r.error.empty(); });
+    if (!folder.empty() && complete) {
+        const std::string text = to_text(pilot);
+        store_binary(folder, key, {reinterpret_cast<const unsigned char*>(text.data()), text.size()});
+    }
+    return pilot;
+}
+
+}  // namespace clume

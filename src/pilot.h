@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// What `auto` becomes: a short pilot renders some pixels of the scene itself with each candidate (strategy, estimator, bound),
+// all unbiased, and takes the one of least variance × work. Work is counted operations times fixed weights
+// (src/work_weights.h), not time, and variances come from exact sums: the choice, and so the image, is the same on every run
+// and device.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "src/renderer.h"
+#include "src/strategies.h"
+
+namespace clume {
+
+struct PilotRow {
+    MethodPair pair;
+    double variance = 0;   ///< of one sample, mean over the pilot's pixels and channels
+    double work_ns = 0;    ///< of one path
+    std::string error;     ///< why it could not be measured
+    double inverse_efficiency() const { return variance * work_ns; }
+};
+
+struct Pilot {
+    std::vector<PilotRow> rows;  ///< in the order measured
+    std::size_t chosen = 0;
+    std::uint32_t pixels = 0, spp = 0;
+
+    /// "auto chose delta:tree/ratio: …", one line.
+    std::string summary() const;
+    /// Feature and text per row, for `--explain`.
+    std::vector<std::pair<std::string, std::string>> table() const;
+};
+
+/// The pilot for a scene whose strategy is `auto`; nothing if it is pinned, or if there is nothing to choose (no media, no
+/// pixel that meets them), or if `stop` became true. A result is kept on disk, keyed by all that it depends on. Throws what
+/// Renderer throws.
+std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options, const std::atomic<bool>& stop);
+
+}  // namespace clume
