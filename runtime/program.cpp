@@ -59,7 +59,7 @@ ProgramOptions& ProgramOptions::define(std::string name, long long value) {
 }
 
 std::string ProgramOptions::text() const {
-    std::string text = "-cl-std=CL1.2";
+    std::string text = optimised ? "-cl-std=CL1.2" : "-cl-std=CL1.2 -cl-opt-disable";
     for (const auto& [name, value] : defines) {
         if ((name + value).find_first_of(" \t\n\"'\\;") != std::string::npos || name.empty())
             throw std::invalid_argument("not a usable define: " + name + "=" + value);

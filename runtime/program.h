@@ -17,6 +17,7 @@ namespace clume {
 struct ProgramOptions {
     /// (name, value) in the order given; an empty value is "-DNAME=" (defined, empty). No blanks or quotes in either.
     std::vector<std::pair<std::string, std::string>> defines;
+    bool optimised = true;  ///< false: sooner built, slower to run, the same results
 
     ProgramOptions& define(std::string name, std::string value);
     ProgramOptions& define(std::string name, long long value);

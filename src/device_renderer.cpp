@@ -18,7 +18,7 @@ constexpr unsigned kFirstBatchArg = SceneBuffers::kArgs + 1;  // after the scene
 int vector_width_of(const DeviceInfo& info, int wanted) { return wanted > 0 ? wanted : static_cast<int>(info.native_vector_width); }
 
 DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene, const std::vector<device::uint>& pixels,
-                               const std::vector<Tile>& tiles, int vector_width)
+                               const std::vector<Tile>& tiles, int vector_width, bool optimised)
     : queue_(info),
       tiles_(tiles),
       params_(scene.params),
@@ -27,6 +27,7 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
       unfinished_(queue_, 1),
       wanted_items_(info.type == "gpu" ? std::size_t{2048} * info.compute_units : std::size_t{128} * std::max(1u, info.compute_units)) {
     ProgramOptions options;
+    options.optimised = optimised;
     for (const auto& [name, value] : scene.defines) options.define(name, value);
     options.define("CLUME_WIDTH", vector_width_of(info, vector_width));
     const cl::Program program = build_program(queue_, "render.cl", options);

@@ -22,9 +22,9 @@ struct Tile {
 
 class DeviceRenderer : public Worker {
 public:
-    /// Builds the program (width 0: the device's own), uploads the scene, warms up. Throws DeviceError.
+    /// Builds the program (width 0: the device's own; not `optimised`: sooner), uploads the scene, warms up. Throws DeviceError.
     DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene, const std::vector<device::uint>& pixels, const std::vector<Tile>& tiles,
-                   int vector_width);
+                   int vector_width, bool optimised = true);
 
     /// Batches from now on use `seed` and add to `film`, which must outlive them. Throws DeviceError.
     void aim(FilmSums& film, std::uint64_t seed);

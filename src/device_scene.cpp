@@ -324,7 +324,7 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     if (wanted.bvh) define("CLUME_BVH_STACK", out.bvh_stack);
     define("CLUME_MIXTURE", !out.ellipsoids.empty() || scene.grids.empty());
     define_grids(scene, voxels, out);
-    if (!out.cells.empty()) define("CLUME_CELL_LEVELS", out.params.cells_levels);
+    if (!out.cells.empty()) define("CLUME_CELL_LEVELS", options.most_pixels > 0 ? 8 : out.params.cells_levels);  // a pilot's bounds share a program
 
     const auto say = [&](const char* feature, std::string what) { out.explain.emplace_back(feature, std::move(what)); };
     const std::initializer_list<const char*> kinds = {"constant", "envmap", "point", "spot", "directional", "sphere", "rectangle"};

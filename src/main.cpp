@@ -118,7 +118,7 @@ int run(const RenderCommand& command) {
     if (const auto& crop = command.options.crop; crop && (crop->x1 > scene.film.width || crop->y1 > scene.film.height))
         throw UsageError(fmt::format("--crop {},{},{},{}: reaches beyond the film, which is {} x {}", crop->x0, crop->y0,
                                      crop->x1, crop->y1, scene.film.width, scene.film.height));
-    const std::optional<Pilot> pilot = run_pilot(scene, command.options, stop_requested());
+    const std::optional<Pilot> pilot = run_pilot(scene, command.options, pilot_folder(), stop_requested());
     if (pilot) scene = with_pair(std::move(scene), pilot->rows[pilot->chosen].pair);
     if (command.explain) print_explanation(scene, command.options, pilot);
 

@@ -2,7 +2,6 @@
 #include "src/pilot.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <fmt/format.h>
@@ -22,7 +21,7 @@ constexpr std::uint32_t kPixels = 1024;     ///< at most
 constexpr std::uint32_t kSamples = 16;      ///< of each
 constexpr std::uint32_t kFirstSample = 0xc0000000u;  ///< numbers of their own: the image's noise is not what was chosen by
 constexpr std::size_t kFewPrimitives = 64;  ///< up to which one bound for the whole scene may be the cheapest
-constexpr int kVersion = 1;                 ///< of the candidates and of how they are measured
+constexpr int kVersion = 2;                 ///< of the candidates and of how they are measured
 
 /// `pixels` becomes the number rendered.
 PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const std::atomic<bool>& stop, std::uint32_t& pixels) {
@@ -134,7 +133,12 @@ std::vector<std::pair<std::string, std::string>> Pilot::table() const {
     return lines;
 }
 
-std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options, const std::atomic<bool>& stop) {
+std::filesystem::path pilot_folder() {
+    const std::filesystem::path cache = program_cache_folder();
+    return cache.empty() ? cache : cache / "pilots";
+}
+
+std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options, const std::filesystem::path& folder, const std::atomic<bool>& stop) {
     if (scene.render.strategy != "auto") return std::nullopt;
     if (scene.media.empty() && scene.grids.empty()) return std::nullopt;
     // One device is enough, and which one makes no difference.
@@ -147,8 +151,6 @@ std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options,
     for (const double w : work_weights_ns) key += fmt::format(" {}", w);
     for (const auto& [name, value] : device.defines) key += " " + name + "=" + value;
     key = sha256_hex(key);
-    const std::filesystem::path cache = program_cache_folder();
-    const std::filesystem::path folder = cache.empty() ? cache : cache / "pilots";
     if (!folder.empty())
         if (const auto bytes = load_binary(folder, key))
             if (auto pilot = from_text(std::string(bytes->begin(), bytes->end()))) return pilot;

@@ -5,6 +5,8 @@
 // and device.
 #pragma once
 
+#include <atomic>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -35,8 +37,11 @@ struct Pilot {
 };
 
 /// The pilot for a scene whose strategy is `auto`; nothing if it is pinned, or if there is nothing to choose (no media, no
-/// pixel that meets them), or if `stop` became true. A result is kept on disk, keyed by all that it depends on. Throws what
-/// Renderer throws.
-std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options, const std::atomic<bool>& stop);
+/// pixel that meets them), or if `stop` became true. A result is kept in `folder` (unless that is empty), keyed by all that it
+/// depends on. Throws what Renderer throws.
+std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options, const std::filesystem::path& folder, const std::atomic<bool>& stop);
+
+/// Beside the programs' cache; empty if there is none.
+std::filesystem::path pilot_folder();
 
 }  // namespace clume

@@ -137,7 +137,7 @@ void Renderer::Impl::make_workers(const std::vector<DeviceInfo>& devices, const 
             if (!test.error.empty()) throw DeviceError(fmt::format("{} fails its self-test: {}", d.label(), test.error));
             if (!test.outside_exact_set.empty())
                 setup.warnings.push_back(fmt::format("{} is outside the bit-exact set: {}", d.label(), test.outside_exact_set));
-            workers.push_back(std::make_unique<DeviceRenderer>(d, device, pixels, tiles, options.vector_width));
+            workers.push_back(std::make_unique<DeviceRenderer>(d, device, pixels, tiles, options.vector_width, options.most_pixels == 0));
         } catch (const DeviceError& e) {
             if (devices.size() == 1) throw;
             setup.warnings.push_back(fmt::format("device left out: {}", e.what()));

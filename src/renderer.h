@@ -32,7 +32,7 @@ struct RenderOptions {
     std::optional<double> time_limit_s;        ///< stop handing out batches after this long; the image holds what was done
     std::uint32_t batch_samples = 0;           ///< samples of a pixel per batch; 0: sized to 100–200 ms by measurement
     int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own
-    std::uint32_t most_pixels = 0;             ///< > 0: at most so many of the pixels that meet something, spread over them
+    std::uint32_t most_pixels = 0;             ///< > 0: a pilot: at most so many of the pixels that meet something, by a program that is sooner built
     bool count_work = false;                   ///< count operations (stats.work, image.tests): costs a few per cent of speed
     std::string accelerator = "auto";          ///< of what visits chords (decomposition, analytic, march): "cells", "bvh" or "auto"
 };

@@ -106,7 +106,7 @@ struct SceneFolder {
         std::ofstream(path / "puff.json") << R"({
   "camera": { "origin": [0, 0, -4], "target": [0, 0, 0] },
   "film": { "width": 32, "height": 24 },
-  "render": { "spp": 4 },
+  "render": { "spp": 4, "strategy": "delta" },
   "media": [ { "type": "ellipsoids", "kernel": "gaussian",
                "primitives": [ { "center": [0, 0, 0], "scale": 0.5, "density": 4 } ] } ],
   "lights": [ { "type": "constant", "radiance": 1 } ]

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+// The pilot behind `auto`: least variance × work of what it measured, the same wherever and how often it runs, none where the
+// strategy is pinned or nothing is to be seen; and what the command line says of it.
+#include <atomic>
+#include <catch2/catch.hpp>
+
+#include "src/pilot.h"
+#include "tests/cli_process.h"
+#include "tests/reference/analytic_scenes.h"
+#include "tests/temp_folder.h"
+
+namespace {
+
+using namespace clume;
+
+const std::atomic<bool> go_on{false};
+
+/// Two lights that are sampled directly, so that estimators matter; small.
+Scene lit_mixture(int n, double overlap) {
+    Scene scene = reference::random_mixture(KernelFamily::gaussian, n, 9, overlap, 2);
+    scene.film = {24, 24};
+    scene.lights.clear();
+    Light sun;
+    sun.kind = LightKind::directional;
+    sun.direction = {0.2, -1, 0.3};
+    sun.irradiance = glm::dvec3(2);
+    scene.lights.push_back(sun);
+    return scene;
+}
+
+}  // namespace
+
+TEST_CASE("Pilot.ChoosesTheLeastInverseEfficiencyAgainAndAgain") {
+    const Scene scene = lit_mixture(120, 10);
+    std::optional<Pilot> first;
+    for (int run = 0; run < 3; ++run) {
+        const test::TempFolder folder;
+        RenderOptions options;
+        if (run == 1) options.cpu_split = 2, options.vector_width = 4;
+        if (run == 2) options.batch_samples = 3, options.crop = CropWindow{3, 3, 9, 9};
+        Scene other = scene;
+        other.render.spp = 1 + static_cast<std::uint32_t>(run);
+        const auto pilot = run_pilot(other, options, folder.path(), go_on);
+        REQUIRE(pilot);
+        if (!first) first = pilot;
+        REQUIRE(pilot->rows.size() == first->rows.size());
+        CHECK(pilot->chosen == first->chosen);
+        for (std::size_t i = 0; i < pilot->rows.size(); ++i) {
+            const PilotRow &row = pilot->rows[i], &same = first->rows[i];
+            INFO(row.pair.label());
+            CHECK(row.error.empty());
+            CHECK(row.variance == same.variance);
+            CHECK(row.work_ns == same.work_ns);
+            CHECK(row.variance > 0);
+            CHECK(row.work_ns > 0);
+            CHECK(pilot->rows[pilot->chosen].inverse_efficiency() <= row.inverse_efficiency());
+        }
+        // Kept: the second time it is read.
+        const auto again = run_pilot(other, options, folder.path(), go_on);
+        REQUIRE(again);
+        CHECK(again->chosen == pilot->chosen);
+        CHECK(again->rows.back().work_ns == pilot->rows.back().work_ns);
+    }
+    std::size_t estimators = 0, bounds = 0;
+    for (const PilotRow& row : first->rows) {
+        estimators += row.pair.estimator != "analytic";
+        bounds += row.pair.strategy == "delta" && row.pair.estimator == "analytic";
+    }
+    CHECK(estimators == 3);
+    CHECK(bounds == 2);
+}
+
+TEST_CASE("Pilot.FindsWhatIsCheapest") {
+    // Under high overlap every chord of decomposition is dear, and sorting them dearer still.
+    const test::TempFolder folder;
+    Scene scene = lit_mixture(400, 40);
+    const auto pilot = run_pilot(scene, {}, folder.path(), go_on);
+    REQUIRE(pilot);
+    CHECK(pilot->rows[pilot->chosen].pair.strategy == "delta");
+    double work[3] = {};
+    for (const PilotRow& row : pilot->rows) {
+        if (row.pair.label() == "delta:tree/analytic") work[0] = row.work_ns;
+        if (row.pair.label() == "decomposition/analytic") work[1] = row.work_ns;
+        if (row.pair.label() == "regular/analytic") work[2] = row.work_ns;
+    }
+    CHECK(work[0] < work[1]);
+    CHECK(work[1] < work[2]);
+}
+
+TEST_CASE("Pilot.NotWhereNothingIsToChoose", "[quick]") {
+    const test::TempFolder folder;
+    Scene scene = lit_mixture(5, 3);
+    scene.render.strategy = "regular";
+    CHECK_FALSE(run_pilot(scene, {}, folder.path(), go_on));
+    scene.render.strategy = "auto";
+    scene.media.clear();
+    CHECK_FALSE(run_pilot(scene, {}, folder.path(), go_on));
+    scene = lit_mixture(5, 3);
+    scene.camera.target = scene.camera.origin + glm::dvec3(0, 0, -1);  // looks away
+    CHECK_FALSE(run_pilot(scene, {}, folder.path(), go_on));
+    const std::atomic<bool> stop{true};
+    CHECK_FALSE(run_pilot(lit_mixture(5, 3), {}, folder.path(), stop));
+}
+
+TEST_CASE("Pilot.IsToldByExplainAndTheImage") {
+    const test::SceneFolder folder;
+    test::Process run({"render", "puff.json", "--quiet", "--explain", "-D", "render.strategy=auto", "--stats-json", "s.json"}, folder.path);
+    CHECK(run.wait() == 0);
+    CHECK_THAT(run.err, Catch::Contains("pilot delta:tree/analytic") && Catch::Contains("<- chosen"));
+    std::ifstream in(folder.path / "s.json");
+    const std::string stats{std::istreambuf_iterator<char>(in), {}};
+    CHECK_THAT(stats, Catch::Contains("auto chose "));
+    test::Process pinned({"render", "puff.json", "--quiet", "--explain", "-D", "render.strategy=decomposition"}, folder.path);
+    CHECK(pinned.wait() == 0);
+    CHECK(pinned.err.find("pilot") == std::string::npos);
+}
