@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "bench/rays.h"
 #include "bench/scenes.h"
@@ -60,7 +61,23 @@ struct Field {
     DeviceScene device;
     std::unique_ptr<Probe> probe;
     std::vector<ProbeRay> camera, inside;
+    std::optional<double> work[2];  ///< per flight from the camera, from inside
 };
+
+/// Work per flight, by a program that counts: an untimed run of its own. Every width does the same work.
+double work_per_flight(Session& session, Field& f, bool inside, const std::string& accelerator) {
+    std::optional<double>& work = f.work[inside];
+    if (!work) {
+        RenderOptions options = session.render_options();
+        options.accelerator = accelerator;
+        options.count_work = true;
+        const auto& rays = inside ? f.inside : f.camera;
+        double sum = 0;
+        for (const ProbeHit& hit : Probe(session.device(), make_device_scene(f.scene, options)).flights(rays).values) sum += hit.work;
+        work = sum / static_cast<double>(rays.size());
+    }
+    return *work;
+}
 
 Field& field(Session& session, const std::string& scene, const std::string& strategy, const std::string& accelerator, int width) {
     static std::string scene_key, probe_key;
@@ -149,10 +166,7 @@ void add_ray_benchmarks(Session& session) {
                         Field& f = field(session, scene, m.strategy, m.accelerator, width);
                         const auto& rays = inside ? f.inside : f.camera;
                         const auto result = f.probe->flights(rays, number);
-                        double work = 0;
-                        for (const ProbeHit& hit : result.values) work += hit.work;
-                        const auto count = static_cast<double>(rays.size());
-                        return Launch{count, result.device_s, work / count};
+                        return Launch{static_cast<double>(rays.size()), result.device_s, work_per_flight(session, f, inside, m.accelerator)};
                     });
                     if (!m.transmittance) continue;
                     add_kernel_benchmark(session, fmt::format("transmittance/{}/{}/{}{}", scene, m.transmittance, from, suffix), [=, &session](std::uint32_t) {

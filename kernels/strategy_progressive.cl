@@ -10,7 +10,8 @@ static float progressive_clamp(float sigma, float bound, __global uint* raised, 
     if (!(sigma > bound)) return sigma;
     atomic_max(raised, as_uint(sigma));  // bits of positive floats are ordered as they are
     f->violations += 1;
-    f->excess += (ulong)(divide_s(sigma - bound, sigma) * 0x1p20f);
+    // Look-ups come at the rate `bound`: each stands for so much optical depth that is missing.
+    f->excess += convert_ulong_rtz(min_s(divide_s(sigma - bound, bound), 0x1p20f) * 0x1p20f);
     return bound;
 }
 

@@ -30,7 +30,7 @@ public:
 
     std::uint64_t nonfinite() const { return nonfinite_; }
     std::uint64_t violations() const { return violations_; }
-    double excess() const { return static_cast<double>(excess_) * 0x1p-20; }  ///< Σ over densities above their bound of the share lost
+    double excess() const { return static_cast<double>(excess_) * 0x1p-20; }  ///< Σ over densities above their bound of (density − bound) / bound
     const WorkCounts& work() const { return work_; }
 
 private:

@@ -25,7 +25,8 @@ struct ProbeRay {
 };
 
 /// What one ray gave; t is 1e30 and primitive CLUME_NO_PRIMITIVE if it escaped. `primitive` is only set by `decomposition`
-/// and in programs that look something up per primitive. `work`: groups evaluated by the flight.
+/// and in programs that look something up per primitive. `work`: groups, primitives and voxels
+/// evaluated; 0 unless the scene was made with RenderOptions::count_work.
 struct ProbeHit {
     float t;
     std::uint32_t primitive;
@@ -87,9 +88,9 @@ public:
     ProbeRun<ProbeHit> flights(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
     /// Exact transmittances up to t_end.
     ProbeRun<ProbeHit> transmittances(std::span<const ProbeRay> rays);
-    /// The renderer's estimates: exact up to a depth, by roulette beyond.
     /// Transmittances up to t_end by the program's estimator.
     ProbeRun<ProbeHit> estimated_transmittances(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
+    /// Those of `analytic`: exact up to a depth, by roulette beyond.
     ProbeRun<ProbeHit> roulette_transmittances(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
     /// Every ray against grid g of the scene alone, which has one.
     ProbeRun<ProbeGrid> grid(std::span<const ProbeRay> rays, std::uint32_t g = 0);

@@ -182,12 +182,13 @@ void Renderer::Impl::run_pass(Accumulation::State& a, std::uint32_t begin, std::
     a.time_limited = a.time_limited || (report.stopped && !stop_asked());
 }
 
-// A first look at how high the density goes: passes that the image does not hold, until few look-ups exceed their bound.
+// A first look at how high the density goes: passes that the image does not hold, until little exceeds its bound.
 // Then passes that double, each under what all before it have found, so that the share of the image made under low bounds
 // vanishes. Everything is a function of seed and sample numbers, and so are the bounds.
 void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, const RunControl& control) {
-    constexpr int most_warm_up = 24;
-    constexpr double enough = 1e-3;      // look-ups above their bound, of all
+    // Optical depth left out, of the bounds'. Not the share of look-ups above their bound: where bounds are far too low there
+    // are hardly any look-ups, and those that are stand for much.
+    constexpr double enough = 1e-3;
     constexpr float margin = 1.25f;      // over what was found: the highest density is seldom hit
     constexpr std::uint32_t first_warm_up_sample = 0x80000000u;
     const auto pass = [&](Accumulation::State& film, std::uint32_t begin, std::uint32_t pass_end) {
@@ -201,7 +202,7 @@ void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, con
     if (a.learned.empty()) {
         a.learned = first_bounds;
         const auto samples = static_cast<std::uint32_t>(std::max<std::size_t>(1, 16384 / pixels.size()));
-        for (int k = 0; k < most_warm_up; ++k) {
+        for (int k = 0; k < options.progressive_warm_up; ++k) {
             const std::uint32_t begin = first_warm_up_sample + static_cast<std::uint32_t>(k) * samples;
             Accumulation::State scratch{a.seed, begin, begin, FilmSums(pixels.size(), channels, film_scale), {}};
             pass(scratch, begin, begin + samples);
@@ -210,7 +211,7 @@ void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, con
             a.interrupted = scratch.interrupted;
             a.time_limited = scratch.time_limited;
             a.device_lost = scratch.device_lost;
-            if (a.stopped() || static_cast<double>(scratch.film.violations()) <= enough * static_cast<double>(scratch.film.work()[WORK_DENSITIES])) break;
+            if (a.stopped() || scratch.film.excess() <= enough * static_cast<double>(scratch.film.work()[WORK_DENSITIES])) break;
         }
     }
     while (a.end < end && !a.stopped()) {
@@ -260,6 +261,7 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     impl_->channels = grey ? 1 : 3;
     impl_->film_scale = static_cast<double>(device.params.film_scale);
     impl_->first_bounds = device.learned;
+    for (float& bound : impl_->first_bounds) bound *= static_cast<float>(o.progressive_start);
     impl_->make_workers(devices, device);
 }
 
@@ -308,7 +310,7 @@ RenderResult Renderer::result(const Accumulation& accumulation) const {
     stats.excess = a.film.excess();
     stats.bound_violations = a.film.violations();
     if (!impl_->first_bounds.empty())
-        stats.notes.push_back(fmt::format("progressive: {} of {} look-ups found the density above its learned bound ({:.3g} %), which took {:.3g} % of the density looked up", stats.bound_violations,
+        stats.notes.push_back(fmt::format("progressive: {} of {} look-ups found the density above its learned bound ({:.3g} %), which left out {:.3g} % of the bounds' optical depth", stats.bound_violations,
                                           stats.work[WORK_DENSITIES], 100.0 * static_cast<double>(stats.bound_violations) / std::max(1.0, static_cast<double>(stats.work[WORK_DENSITIES])),
                                           100.0 * stats.excess / std::max(1.0, static_cast<double>(stats.work[WORK_DENSITIES]))));
     else if (stats.bound_violations > 0)

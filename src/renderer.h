@@ -35,6 +35,8 @@ struct RenderOptions {
     std::uint32_t most_pixels = 0;             ///< > 0: a pilot: at most so many of the pixels that meet something, by a program that is sooner built
     bool count_work = false;                   ///< count operations (stats.work, image.tests): costs a few per cent of speed
     std::string accelerator = "auto";          ///< of what visits chords (decomposition, analytic, march): "cells", "bvh" or "auto"
+    double progressive_start = 1;              ///< factor on the first bounds of `progressive`
+    int progressive_warm_up = 24;              ///< passes at most by which `progressive` learns before the image begins
 };
 
 /// Operations by kind: WORK_* of layout.h.
@@ -67,7 +69,7 @@ struct RenderStats {
     std::uint64_t bound_violations = 0;        ///< density above its majorant; 0 unless a bound was wrong
     std::uint64_t primitives = 0;
     WorkCounts work{};                         ///< operations of all paths, if RenderOptions::count_work
-    double excess = 0;                         ///< Σ over the densities above their bound of the share of extinction lost
+    double excess = 0;                         ///< optical depth that bounds below the density left out: Σ of (density − bound) / bound
     std::uint64_t device_bytes = 0;            ///< scene buffers on one device
     std::string layout_hash;                   ///< SHA-256 of the device buffers
     double build_s = 0, compile_s = 0, render_s = 0;
