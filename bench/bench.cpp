@@ -48,6 +48,7 @@ std::optional<bench::Options> parse(int argc, char** argv) {
     app.add_option("--rounds", o.rounds, "measurements of which the median is printed; default: 7")->type_name("N");
     app.add_option("--strategy", o.strategy, "distance sampling of scenes and scaling: decomposition, delta or march")->type_name("NAME");
     app.add_option("--accelerator", o.accelerator, "of what visits chords, in scenes and scaling: cells, bvh or auto")->type_name("NAME");
+    app.add_option("--study", o.study, "measure what docs/strategies.md shows instead, and put it there: 15 to 30 minutes")->type_name("DOCS");
     app.add_option("--json", o.json, "write the results to this file, too")->type_name("FILE");
     app.add_flag("--quick", o.quick, "smaller samples and three rounds: a minute, to see that it works");
     try {
@@ -87,10 +88,15 @@ int run_bench(int argc, char** argv) {
         const DeviceInfo& d = session.device();
         fmt::print("{} ({}, {} units, native width {}); load average {:.1f}\n", d.label(), d.platform_version, d.compute_units, d.native_vector_width, bench::load_average());
     }
+    if (!options->study.empty()) {
+        bench_study_section(session);
+    } else {
     bench_scenes_section(session);
     bench_kernels_section(session);
     bench_specialisation_section(session);
     bench_scaling_section(session);
+    bench_work_section(session);
+    }
     if (!session.any()) throw UsageError("bench: --filter " + options->filter + ": is found in no item's name; see clume bench --list");
     if (!options->list) fmt::print("\nload average {:.1f}\n", bench::load_average());
     if (!options->json.empty() && !options->list) {

@@ -24,6 +24,7 @@ struct Options {
     std::string strategy;             ///< of scenes and scaling; empty: auto
     std::string accelerator = "auto";
     std::string json;                 ///< file to write; empty: none
+    std::string study;                ///< folder of docs that the study writes into; empty: no study
 };
 
 /// Named values of one item, in the order printed; NaN becomes null.

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
-// What one counted operation costs: nanoseconds of one core of a 16-wide CPU. Only ratios matter, and only for choosing
-// between strategies: fixed numbers, so that the choice is the same on every run and device.
+// What a counted operation costs: processor nanoseconds, for telling beforehand which strategy will be faster. Ratios matter,
+// not absolute values; they were fitted on PoCL 3.1 with vectors of 16 (`clume bench --filter ^work/`, which prints how far off
+// they are).
 #pragma once
 
 #include <array>
 
-#include "kernels/layout.h"
+#include "src/renderer.h"
 
 namespace clume {
 
-/// By WORK_* (layout.h): cells, nodes, groups, primitives, densities, voxels, segments, roots, draws.
-inline constexpr std::array<double, WORK_KINDS> work_weights_ns = {28, 40, 45, 25, 10, 20, 40, 30, 10};
+/// Per operation of each kind (WORK_* of layout.h, names in work_names).
+inline constexpr std::array<double, WORK_KINDS> work_weights_ns = {35, 193, 9, 31, 9, 9, 81, 72, 23};
 
 }  // namespace clume

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: MIT
+// Colours are Okabe and Ito's, one per strategy whatever the plot.
+#include "bench/report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+
+#include "src/error.h"
+#include "src/output_file.h"
+
+namespace clume::bench {
+namespace {
+
+namespace fs = std::filesystem;
+
+void write(const fs::path& path, const std::string& text) {
+    OutputFile file(path);
+    std::fwrite(text.data(), 1, text.size(), file.stream());
+    file.commit();
+}
+
+constexpr std::array<std::pair<const char*, const char*>, 9> styles{{{"delta:tree", "lc rgb '#0072b2' pt 7"},
+                                                                     {"delta:grid", "lc rgb '#0072b2' dt 2 pt 6"},
+                                                                     {"delta:scene", "lc rgb '#0072b2' dt 4 pt 8"},
+                                                                     {"decomposition", "lc rgb '#d55e00' pt 5"},
+                                                                     {"regular", "lc rgb '#009e73' pt 9"},
+                                                                     {"regular-linear", "lc rgb '#e69f00' dt 2 pt 8"},
+                                                                     {"march-analytic", "lc rgb '#56b4e9' pt 11"},
+                                                                     {"march", "lc rgb '#777777' pt 13"},
+                                                                     {"progressive", "lc rgb '#cc79a7' pt 15"}}};
+constexpr std::array others{"lc rgb '#0072b2' pt 7", "lc rgb '#d55e00' pt 5", "lc rgb '#009e73' pt 9", "lc rgb '#cc79a7' pt 13", "lc rgb '#e69f00' pt 11", "lc rgb '#56b4e9' pt 15", "lc rgb '#777777' pt 3"};
+
+std::string style(const std::string& name, std::size_t index) {
+    const auto found = std::find_if(styles.begin(), styles.end(), [&](const auto& s) { return name == s.first; });
+    return found != styles.end() ? found->second : others[index % others.size()];
+}
+
+std::string script(const std::string& name, const Plot& p) {
+    std::string data, plots;
+    for (std::size_t i = 0; i < p.series.size(); ++i) {
+        data += fmt::format("$data{} << EOD\n", i);
+        for (const auto& [x, y] : p.series[i].points)
+            if (std::isfinite(y) && (!p.log_y || y > 0)) data += fmt::format("{:.6g} {:.6g}\n", x, y);
+        data += "EOD\n";
+        plots += fmt::format("{}$data{} using 1:2 with {} {} lw 2 ps 1 title '{}'", i ? ", \\\n     " : "plot ", i, p.scatter ? "points" : "linespoints", style(p.series[i].name, i), p.series[i].name);
+    }
+    const std::string axes = fmt::format(
+        "set title '{}'\nset xlabel '{}'\nset ylabel '{}'\n{}{}set format x '%g'\nset format y '%g'\nset grid xtics ytics lc rgb '#dddddd' lw 1 dt 1\n"
+        "set key outside right center samplen 2\nset offsets graph 0.03, graph 0.03, 0, 0\n{}\n",
+        p.title, p.x_label, p.y_label, p.log_x ? "set logscale x\n" : "", p.log_y ? "set logscale y\n" : "", plots);
+    return fmt::format("# Made by clume bench --study; `gnuplot {0}.gp` in this folder makes the plot again.\nset encoding utf8\n{1}"
+                       "set terminal svg size 900,480 dynamic noenhanced font 'sans-serif,14' background 'white'\nset output '{0}.svg'\n{2}"
+                       "set terminal pngcairo size 1260,672 noenhanced font 'sans,14' fontscale 1.3 linewidth 1.4 pointscale 1.4 background 'white'\n"
+                       "set output '{0}.png'\nreplot\nunset output\n",
+                       name, data, axes);
+}
+
+}  // namespace
+
+Report::Report(fs::path docs) : docs_(std::move(docs)), images_(docs_ / "images" / "strategies") {
+    std::error_code error;
+    fs::create_directories(images_, error);
+    if (error) throw RenderError(fmt::format("{}: cannot be made: {}", images_.string(), error.message()));
+}
+
+void Report::csv(const std::string& name, const Table& rows) const {
+    std::string text;
+    for (const auto& row : rows) text += fmt::format("{}\n", fmt::join(row, ","));
+    write(images_ / (name + ".csv"), text);
+}
+
+void Report::plot(const std::string& name, const Plot& plot) const {
+    write(images_ / (name + ".gp"), script(name, plot));
+    const std::string folder = images_.string();
+    if (folder.find('\'') != std::string::npos || std::system(fmt::format("cd '{}' && gnuplot '{}.gp'", folder, name).c_str()) != 0)
+        fmt::print(stderr, "{}: no plot: gnuplot (package gnuplot-nox) cannot be run, or failed\n", name);
+}
+
+std::string Report::markdown(const Table& rows) {
+    std::string text;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        text += fmt::format("| {} |\n", fmt::join(rows[i], " | "));
+        if (i > 0) continue;
+        text += "|";
+        for (std::size_t k = 0; k < rows[0].size(); ++k) text += "---|";
+        text += "\n";
+    }
+    return text;
+}
+
+void Report::text(const std::string& name, const std::string& text) const {
+    const fs::path page = docs_ / "strategies.md";
+    std::ifstream in(page);
+    if (!in) return;
+    std::stringstream buffer;
+    buffer << in.rdbuf();
+    std::string all = buffer.str();
+    const std::string opening = fmt::format("<!-- table {} -->\n", name);
+    const std::size_t begin = all.find(opening), end = begin == std::string::npos ? begin : all.find("<!-- end -->", begin);
+    if (end == std::string::npos) throw RenderError(fmt::format("{}: has no place for table {}: a line <!-- table {} -->, one <!-- end -->", page.string(), name, name));
+    write(page, all.replace(begin + opening.size(), end - begin - opening.size(), text));
+}
+
+}  // namespace clume::bench
