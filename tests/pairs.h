@@ -46,7 +46,7 @@ inline Light small_environment() {
 inline Scene mixed_scene() {
     Scene scene;
     scene.path = "mixed";
-    scene.film = {20, 16};
+    scene.film = {16, 12};
     scene.camera.origin = {0.5, 0.8, -3.4};
     scene.camera.fov_rad = 0.6;
     const KernelFamily kernels[] = {KernelFamily::gaussian, KernelFamily::epanechnikov, KernelFamily::uniform};

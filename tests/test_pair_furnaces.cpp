@@ -66,7 +66,7 @@ TEST_CASE("PairFurnaces.MeanOneWithLightSampling") {
             Scene scene = with_grid(white_furnace(kUniform, density, density > 1), density);
             scene.film = {8, 8};
             scene.render.light_sampling = LightSampling::nee;
-            const RenderResult r = render_pair(pair, scene, 256, 4);
+            const RenderResult r = render_pair(pair, scene, 128, 4);
             INFO("density " << density);
             check_same("pair_furnace_nee by " + pair.name(), colour_of(r.image), grey(8, 8, std::vector<double>(64, 1), {}), 1e-4, 8);
         }

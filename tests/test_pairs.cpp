@@ -76,7 +76,7 @@ TEST_CASE("Pairs.UnbiasedOnesGiveOneImageOfAMixtureAndAGrid") {
                                   {"regular", "binary", "auto", "bisection"},
                                   {"decomposition", "residual-ratio", "tree"},
                                   {"progressive", "binary"}};
-    check_all_equal("mixture_and_grid", mixed_grid_scene(), pairs, 256);
+    check_all_equal("mixture_and_grid", mixed_grid_scene(), pairs, 128);
 }
 
 TEST_CASE("Pairs.BiasedOnesAreFoundBiased") {
@@ -90,21 +90,21 @@ TEST_CASE("Pairs.BiasedOnesAreFoundBiased") {
     }
     scene.lights = {sunlight()};
     scene.render.step = 0.5;
-    const Estimate truth = colour_of(render_pair({"delta"}, scene, 2048, 1).image);
-    check_biased({"march"}, scene, truth, 2048);
-    check_biased({"march-analytic"}, scene, truth, 2048);
-    check_biased({"regular-linear"}, scene, truth, 2048);
-    check_biased({"delta", "march"}, scene, truth, 2048);
+    const Estimate truth = colour_of(render_pair({"delta"}, scene, 512, 1).image);
+    check_biased({"march"}, scene, truth, 512);
+    check_biased({"march-analytic"}, scene, truth, 512);
+    check_biased({"regular-linear"}, scene, truth, 512);
+    check_biased({"delta", "march"}, scene, truth, 512);
     // What they are compared with is not at fault: the unbiased kin of two of them passes.
-    check_same("kin of the biased", colour_of(render_pair({"regular"}, scene, 2048, 2).image), truth);
+    check_same("kin of the biased", colour_of(render_pair({"regular"}, scene, 512, 2).image), truth);
 }
 
 TEST_CASE("Pairs.BiasedOnesAreFoundBiasedInGrids") {
     Scene scene = mixed_grid_scene();
     scene.media.clear();
     scene.lights = {sunlight()};
-    scene.render.step = 0.3;
-    const Estimate truth = colour_of(render_pair({"delta"}, scene, 1024, 1).image);
-    check_biased({"march"}, scene, truth, 1024);
-    check_biased({"regular", "march"}, scene, truth, 1024);
+    scene.render.step = 0.6;
+    const Estimate truth = colour_of(render_pair({"delta"}, scene, 512, 1).image);
+    check_biased({"march"}, scene, truth, 512);
+    check_biased({"regular", "march"}, scene, truth, 512);
 }

@@ -70,7 +70,8 @@ TEST_CASE("Progressive.BiasFallsBelowTheNoise") {
         CHECK(above[i] < 0.5 * above[i - 1]);
         CHECK(excess[i] < 0.5 * excess[i - 1]);
     }
-    CHECK(above[0] > 0.1);
+    // The first pass alone finds most densities above their bounds.
+    CHECK(share_above(render_pair(pair, scene, 1, 3, begin).stats) > 0.3);
     CHECK(above.back() < 2e-3);
 }
 
