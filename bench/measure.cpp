@@ -71,15 +71,17 @@ std::vector<Measured> measure(Session& session, const Scene& scene, std::span<co
             runners[i] = make_runner(scene, m.pair, session.render_options(), options.seed + i);
             m.device_bytes = static_cast<double>(runners[i].renderer->setup().device_bytes);
             m.build_s = runners[i].renderer->setup().build_s;
-            const auto start = std::chrono::steady_clock::now();
-            runners[i].run(1);
-            // Twice: the first launch of a size allocates, and a learned bound is learned then.
-            if (seconds_since(start) < options.round_s) {
-                const auto again = std::chrono::steady_clock::now();
-                runners[i].run(4);
-                runners[i].spp = static_cast<std::uint32_t>(std::clamp(4 * options.round_s / seconds_since(again), 1.0, 65536.0));
-            }
-            if (seconds_since(start) > options.most_s) m.missing = "too slow";
+            const auto timed = [&](std::uint32_t samples) {
+                const auto start = std::chrono::steady_clock::now();
+                runners[i].run(samples);
+                return seconds_since(start);
+            };
+            // The first launch of a size allocates, and a learned bound is learned then, however long the image.
+            const bool slow = timed(1) > options.most_s && m.pair.strategy != "progressive";
+            double sample_s = slow ? options.most_s : timed(1);
+            if (sample_s < options.round_s / 4) sample_s = timed(4) / 4;
+            if (slow || sample_s > options.most_s) m.missing = "too slow";
+            runners[i].spp = static_cast<std::uint32_t>(std::clamp(options.round_s / sample_s, 1.0, 65536.0));
         } catch (const std::exception& e) {
             m.missing = e.what();
         }

@@ -41,19 +41,30 @@ std::string style(const std::string& name, std::size_t index) {
     return found != styles.end() ? found->second : others[index % others.size()];
 }
 
+/// Inside gnuplot's single quotes.
+std::string quoted(std::string text) {
+    for (std::size_t at = 0; (at = text.find('\'', at)) != std::string::npos; at += 2) text.insert(at, 1, '\'');
+    return text;
+}
+
 std::string script(const std::string& name, const Plot& p) {
     std::string data, plots;
+    double least = INFINITY, most = -INFINITY;
     for (std::size_t i = 0; i < p.series.size(); ++i) {
         data += fmt::format("$data{} << EOD\n", i);
-        for (const auto& [x, y] : p.series[i].points)
-            if (std::isfinite(y) && (!p.log_y || y > 0)) data += fmt::format("{:.6g} {:.6g}\n", x, y);
+        for (const auto& [x, y] : p.series[i].points) {
+            if (!std::isfinite(y) || (p.log_y && y <= 0)) continue;
+            data += fmt::format("{:.6g} {:.6g}\n", x, y);
+            least = std::min(least, p.log_x ? x / 1.25 : x);
+            most = std::max(most, p.log_x ? x * 1.25 : x);
+        }
         data += "EOD\n";
-        plots += fmt::format("{}$data{} using 1:2 with {} {} lw 2 ps 1 title '{}'", i ? ", \\\n     " : "plot ", i, p.scatter ? "points" : "linespoints", style(p.series[i].name, i), p.series[i].name);
+        plots += fmt::format("{}$data{} using 1:2 with linespoints {} lw 2 ps 1 title '{}'", i ? ", \\\n     " : "plot ", i, style(p.series[i].name, i), p.series[i].name);
     }
     const std::string axes = fmt::format(
         "set title '{}'\nset xlabel '{}'\nset ylabel '{}'\n{}{}set format x '%g'\nset format y '%g'\nset grid xtics ytics lc rgb '#dddddd' lw 1 dt 1\n"
-        "set key outside right center samplen 2\nset offsets graph 0.03, graph 0.03, 0, 0\n{}\n",
-        p.title, p.x_label, p.y_label, p.log_x ? "set logscale x\n" : "", p.log_y ? "set logscale y\n" : "", plots);
+        "set key outside right center reverse Left samplen 2\nset xrange [{:.6g}:{:.6g}]\n{}\n",
+        quoted(p.title), quoted(p.x_label), quoted(p.y_label), p.log_x ? "set logscale x\n" : "", p.log_y ? "set logscale y\n" : "", least, most, plots);
     return fmt::format("# Made by clume bench --study; `gnuplot {0}.gp` in this folder makes the plot again.\nset encoding utf8\n{1}"
                        "set terminal svg size 900,480 dynamic noenhanced font 'sans-serif,14' background 'white'\nset output '{0}.svg'\n{2}"
                        "set terminal pngcairo size 1260,672 noenhanced font 'sans,14' fontscale 1.3 linewidth 1.4 pointscale 1.4 background 'white'\n"

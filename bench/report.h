@@ -20,7 +20,6 @@ struct Plot {
     std::string title, x_label, y_label;
     bool log_x = true, log_y = true;
     std::vector<Series> series = {};
-    bool scatter = false;  ///< points without lines, named at the point where they are few
 };
 
 using Table = std::vector<std::vector<std::string>>;  ///< the first row is the header

@@ -26,7 +26,7 @@ const Measured* best_of(const std::vector<Measured>& all) {
 void study_baked(Session& session, const Report& report) {
     if (!session.wants("baked")) return;
     const std::atomic<bool> stop{false};
-    Plot error{"A mixture's own grid: error that does not go away", "voxels along the longest axis", "RMS over pixels (% of the mean)"};
+    Plot error{"A mixture's own grid: error that no number of samples removes", "voxels along the longest axis", "RMS over pixels (% of the mean)"};
     Table csv{{"scene", "medium", "pair", "cpu_us", "variance", "inverse_efficiency", "rms_bias_percent", "bias_percent", "bias_error_percent", "device_bytes"}},
         table{{"scene", "medium", "fastest", "µs per path", "variance × time", "RMS bias, %", "bias of the mean, %", "MB on the device"}};
     for (const char* name : {"plume", "smoke_close"}) {

@@ -1,0 +1,66 @@
+# Made by clume bench --study; `gnuplot estimators.gp` in this folder makes the plot again.
+set encoding utf8
+$data0 << EOD
+0.1 3.43448e-09
+1 8.17933e-08
+10 5.02944e-07
+100 2.96253e-07
+1000 2.15709e-07
+EOD
+$data1 << EOD
+0.1 2.22924e-09
+1 4.22861e-08
+10 3.55748e-07
+100 2.63424e-07
+1000 3.05766e-07
+EOD
+$data2 << EOD
+0.1 2.51754e-09
+1 4.23311e-08
+10 3.80165e-07
+100 3.22049e-07
+1000 3.35963e-07
+EOD
+$data3 << EOD
+0.1 2.26349e-09
+1 4.45286e-08
+10 3.31711e-07
+100 2.47537e-07
+1000 2.62809e-07
+EOD
+$data4 << EOD
+0.1 2.33409e-08
+1 1.97655e-07
+10 7.87018e-07
+100 4.58456e-07
+1000 3.76697e-07
+EOD
+$data5 << EOD
+0.1 2.32657e-08
+1 2.55307e-07
+10 1.08798e-06
+100 6.96959e-07
+1000 5.58224e-07
+EOD
+set terminal svg size 900,480 dynamic noenhanced font 'sans-serif,14' background 'white'
+set output 'estimators.svg'
+set title 'Shadow rays: one distant light, 10⁴ primitives, overlap 8'
+set xlabel 'optical depth along the diameter'
+set ylabel 'variance × processor seconds per path'
+set logscale x
+set logscale y
+set format x '%g'
+set format y '%g'
+set grid xtics ytics lc rgb '#dddddd' lw 1 dt 1
+set key outside right center samplen 2
+set offsets graph 0.03, graph 0.03, 0, 0
+plot $data0 using 1:2 with linespoints lc rgb '#0072b2' pt 7 lw 2 ps 1 title 'delta:tree/analytic', \
+     $data1 using 1:2 with linespoints lc rgb '#d55e00' pt 5 lw 2 ps 1 title 'delta:tree/ratio', \
+     $data2 using 1:2 with linespoints lc rgb '#009e73' pt 9 lw 2 ps 1 title 'delta:tree/residual-ratio', \
+     $data3 using 1:2 with linespoints lc rgb '#cc79a7' pt 13 lw 2 ps 1 title 'delta:tree/binary', \
+     $data4 using 1:2 with linespoints lc rgb '#e69f00' pt 11 lw 2 ps 1 title 'decomposition/analytic', \
+     $data5 using 1:2 with linespoints lc rgb '#56b4e9' pt 15 lw 2 ps 1 title 'decomposition/binary'
+set terminal pngcairo size 1260,672 noenhanced font 'sans,14' fontscale 1.3 linewidth 1.4 pointscale 1.4 background 'white'
+set output 'estimators.png'
+replot
+unset output
