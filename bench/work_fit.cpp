@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Non-negative least squares by cyclic descent on the normal equations: ten unknowns, so the simplest method will do.
+// Non-negative least squares by cyclic descent on the normal equations: eleven unknowns, so the simplest method will do.
 #include "bench/work_fit.h"
 
 #include <fmt/format.h>

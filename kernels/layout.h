@@ -93,7 +93,8 @@ struct alignas(16) float4 {
 #define WORK_SEGMENTS 6    // segments of regular tracking
 #define WORK_ROOTS 7       // evaluations by root finding
 #define WORK_DRAWS 8       // blocks of random numbers
-#define WORK_KINDS 9
+#define WORK_EVENTS 9      // flights ended: collisions, with what is scattered and lit there, and escapes
+#define WORK_KINDS 10
 
 // Words of a work-item's film sums: per channel Σx and Σx² (lo, hi), then alpha count, non-finite samples, densities above
 // their bound, the share of extinction lost by that (20 fraction bits), and the work of each kind.

@@ -84,6 +84,7 @@ static void path_event(Path* p, uint pixel, SCENE_ARGS) {
     const float t_end = surfaces_nearest(p->o, p->d, CLUME_INFINITY, NO_LIGHT, &surface, params, lights);
     const int result = flight_sample(p->o, p->d, t_end, &p->flight, &r, SCENE);
     if (result == FLIGHT_PAUSED) return;
+    COUNT(&p->flight.work, WORK_EVENTS, 1);
 #if CLUME_GRID_EMISSION
     p->radiance += p->beta * to_spectrum(grids_emission(p->o, p->d, result == FLIGHT_COLLIDED ? p->flight.t : t_end, &p->flight.work, SCENE));
 #endif

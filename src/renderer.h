@@ -41,7 +41,7 @@ struct RenderOptions {
 
 /// Operations by kind: WORK_* of layout.h.
 using WorkCounts = std::array<std::uint64_t, WORK_KINDS>;
-inline constexpr std::array<const char*, WORK_KINDS> work_names = {"cells", "nodes", "groups", "primitives", "densities", "voxels", "segments", "roots", "draws"};
+inline constexpr std::array<const char*, WORK_KINDS> work_names = {"cells", "nodes", "groups", "primitives", "densities", "voxels", "segments", "roots", "draws", "events"};
 
 /// What was rendered; arrays cover the crop window, row 0 on top.
 struct RenderImage {
