@@ -26,6 +26,7 @@ set format y '%g'
 set grid xtics ytics lc rgb '#dddddd' lw 1 dt 1
 set key outside right center reverse Left samplen 2
 set xrange [12.8:320]
+set xtics (16, 32, 64, 128, 256)
 plot $data0 using 1:2 with linespoints lc rgb '#0072b2' pt 7 lw 2 ps 1 title 'plume', \
      $data1 using 1:2 with linespoints lc rgb '#d55e00' pt 5 lw 2 ps 1 title 'smoke_close'
 set terminal pngcairo size 1260,672 noenhanced font 'sans,14' fontscale 1.3 linewidth 1.4 pointscale 1.4 background 'white'

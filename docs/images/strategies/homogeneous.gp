@@ -24,6 +24,7 @@ set format y '%g'
 set grid xtics ytics lc rgb '#dddddd' lw 1 dt 1
 set key outside right center reverse Left samplen 2
 set xrange [0.8:80]
+set xtics (1, 4, 16, 64)
 plot $data0 using 1:2 with linespoints lc rgb '#0072b2' pt 7 lw 2 ps 1 title 'optical depth 10', \
      $data1 using 1:2 with linespoints lc rgb '#d55e00' pt 5 lw 2 ps 1 title 'optical depth 100'
 set terminal pngcairo size 1260,672 noenhanced font 'sans,14' fontscale 1.3 linewidth 1.4 pointscale 1.4 background 'white'
