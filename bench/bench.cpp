@@ -21,11 +21,12 @@ namespace clume {
 namespace {
 
 constexpr const char* overview =
-    "Measures speed on one device. Sections: scenes (the renderer beside a plain host tracer), kernels, specialisation, scaling.\n"
-    "An item is called section/name: --list prints them, --filter chooses. Everything takes five to eight minutes on two cores.\n";
+    "Measures speed on one device. Sections: scenes (the renderer beside a plain host tracer), kernels, specialisation, scaling,\nwork (what an operation costs); with --study the study of strategies instead.\n"
+    "An item is called section/name: --list prints them, --filter chooses. Everything takes about ten minutes on two cores,\nthe study 15 to 30.\n";
 constexpr const char* examples =
     "Examples: clume bench --filter ^scenes/          clume bench --filter 'flight/ball.*w16'\n"
-    "          clume bench --quick --json speed.json";
+    "          clume bench --quick --json speed.json\n"
+    "          clume bench --study docs          (remakes what docs/strategies.md shows)";
 
 std::vector<std::string> flag_names(const CLI::App& app) {
     std::vector<std::string> names;
@@ -46,7 +47,7 @@ std::optional<bench::Options> parse(int argc, char** argv) {
     app.add_option("--device", o.device, "id or part of a name; default: the best one")->type_name("DEVICE");
     app.add_option("--width", o.width, "primitives per vector: 16, 8, 4 or 1; default: the device's own, and all four for kernels")->type_name("W");
     app.add_option("--rounds", o.rounds, "measurements of which the median is printed; default: 7")->type_name("N");
-    app.add_option("--strategy", o.strategy, "distance sampling of scenes and scaling: decomposition, delta or march")->type_name("NAME");
+    app.add_option("--strategy", o.strategy, "distance sampling of scenes and scaling: delta, decomposition, regular, progressive, march …")->type_name("NAME");
     app.add_option("--accelerator", o.accelerator, "of what visits chords, in scenes and scaling: cells, bvh or auto")->type_name("NAME");
     app.add_option("--study", o.study, "measure what docs/strategies.md shows instead, and put it there: 15 to 30 minutes")->type_name("DOCS");
     app.add_option("--json", o.json, "write the results to this file, too")->type_name("FILE");
@@ -72,7 +73,7 @@ std::optional<bench::Options> parse(int argc, char** argv) {
     };
     if (app.count("--width") > 0) one_of("--width", std::to_string(o.width), {"16", "8", "4", "1"});
     if (app.count("--rounds") > 0 && (o.rounds < 1 || o.rounds > 1000)) throw UsageError("bench: --rounds: must lie between 1 and 1000");
-    if (app.count("--strategy") > 0) one_of("--strategy", o.strategy, {"auto", "decomposition", "delta", "march"});
+    if (app.count("--strategy") > 0) one_of("--strategy", o.strategy, {"auto", "delta", "decomposition", "regular", "progressive", "regular-linear", "march-analytic", "march"});
     one_of("--accelerator", o.accelerator, {"auto", "cells", "bvh"});
     return o;
 }
@@ -91,11 +92,11 @@ int run_bench(int argc, char** argv) {
     if (!options->study.empty()) {
         bench_study_section(session);
     } else {
-    bench_scenes_section(session);
-    bench_kernels_section(session);
-    bench_specialisation_section(session);
-    bench_scaling_section(session);
-    bench_work_section(session);
+        bench_scenes_section(session);
+        bench_kernels_section(session);
+        bench_specialisation_section(session);
+        bench_scaling_section(session);
+        bench_work_section(session);
     }
     if (!session.any()) throw UsageError("bench: --filter " + options->filter + ": is found in no item's name; see clume bench --list");
     if (!options->list) fmt::print("\nload average {:.1f}\n", bench::load_average());

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <set>
 #include <sstream>
 
 #include "src/error.h"
@@ -50,11 +51,13 @@ std::string quoted(std::string text) {
 std::string script(const std::string& name, const Plot& p) {
     std::string data, plots;
     double least = INFINITY, most = -INFINITY;
+    std::set<double> tics;  // where something was measured
     for (std::size_t i = 0; i < p.series.size(); ++i) {
         data += fmt::format("$data{} << EOD\n", i);
         for (const auto& [x, y] : p.series[i].points) {
             if (!std::isfinite(y) || (p.log_y && y <= 0)) continue;
             data += fmt::format("{:.6g} {:.6g}\n", x, y);
+            tics.insert(x);
             least = std::min(least, p.log_x ? x / 1.25 : x);
             most = std::max(most, p.log_x ? x * 1.25 : x);
         }
@@ -63,8 +66,8 @@ std::string script(const std::string& name, const Plot& p) {
     }
     const std::string axes = fmt::format(
         "set title '{}'\nset xlabel '{}'\nset ylabel '{}'\n{}{}set format x '%g'\nset format y '%g'\nset grid xtics ytics lc rgb '#dddddd' lw 1 dt 1\n"
-        "set key outside right center reverse Left samplen 2\nset xrange [{:.6g}:{:.6g}]\n{}\n",
-        quoted(p.title), quoted(p.x_label), quoted(p.y_label), p.log_x ? "set logscale x\n" : "", p.log_y ? "set logscale y\n" : "", least, most, plots);
+        "set key outside right center reverse Left samplen 2\nset xrange [{:.6g}:{:.6g}]\nset xtics ({:g})\n{}\n",
+        quoted(p.title), quoted(p.x_label), quoted(p.y_label), p.log_x ? "set logscale x\n" : "", p.log_y ? "set logscale y\n" : "", least, most, fmt::join(tics, ", "), plots);
     return fmt::format("# Made by clume bench --study; `gnuplot {0}.gp` in this folder makes the plot again.\nset encoding utf8\n{1}"
                        "set terminal svg size 900,480 dynamic noenhanced font 'sans-serif,14' background 'white'\nset output '{0}.svg'\n{2}"
                        "set terminal pngcairo size 1260,672 noenhanced font 'sans,14' fontscale 1.3 linewidth 1.4 pointscale 1.4 background 'white'\n"

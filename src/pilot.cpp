@@ -40,7 +40,7 @@ PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodP
         for (std::size_t k = 0; k < WORK_KINDS; ++k) row.work_ns += work_weights_ns[k] * static_cast<double>(r.stats.work[k]);
         for (const float v : r.image.variance) row.variance += static_cast<double>(v);
         const double paths = static_cast<double>(pixels) * kSamples;
-        row.work_ns = (row.work_ns + 100 * paths) / paths;  // and a hundred for the path itself
+        row.work_ns /= paths;
         row.variance *= kSamples / (3.0 * static_cast<double>(pixels));
     } catch (const RenderError& e) {
         row.error = e.what();

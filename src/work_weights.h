@@ -11,6 +11,6 @@
 namespace clume {
 
 /// Per operation of each kind (WORK_* of layout.h, names in work_names).
-inline constexpr std::array<double, WORK_KINDS> work_weights_ns = {35, 193, 9, 31, 9, 9, 81, 72, 23, 100};
+inline constexpr std::array<double, WORK_KINDS> work_weights_ns = {13, 171, 8, 15, 7, 9, 76, 71, 43, 150};
 
 }  // namespace clume

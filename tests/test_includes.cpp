@@ -24,6 +24,7 @@ bool is_allowed(const std::string& from, const std::string& to) {
     const std::string lower = floor_of(to);
     const std::set<std::string> above_all{"bench", "tests"};
     if (floor_of(from) == "kernels") return lower == "kernels";
+    if (from.ends_with(".cl") && above_all.count(floor_of(from)) == 1) return lower == "kernels";
     if (floor_of(from) == "runtime") return lower == "runtime";
     if (above_all.count(floor_of(from)) == 1 && above_all.count(lower) == 1) return true;
     if (from == "src/main.cpp" && to == "bench/bench.h") return true;
@@ -74,8 +75,9 @@ Includes read_includes(const fs::path& root) {
             for (std::string line; std::getline(file, line);) {
                 if (!std::regex_search(line, match, pattern)) continue;
                 const fs::path beside = entry.path().parent_path() / match[1].str();
-                const fs::path found =
-                    fs::exists(beside) ? beside.lexically_normal().lexically_relative(root) : fs::path(match[1].str());
+                // Programs are assembled from one set of files, wherever they stand.
+                const fs::path elsewhere = extension == ".cl" ? fs::path("kernels") / match[1].str() : fs::path(match[1].str());
+                const fs::path found = fs::exists(beside) ? beside.lexically_normal().lexically_relative(root) : elsewhere;
                 targets.insert(found.generic_string());
             }
         }

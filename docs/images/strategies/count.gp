@@ -59,8 +59,9 @@ set logscale y
 set format x '%g'
 set format y '%g'
 set grid xtics ytics lc rgb '#dddddd' lw 1 dt 1
-set key outside right center samplen 2
-set offsets graph 0.03, graph 0.03, 0, 0
+set key outside right center reverse Left samplen 2
+set xrange [80:1.25e+06]
+set xtics (100, 1000, 10000, 100000, 1e+06)
 plot $data0 using 1:2 with linespoints lc rgb '#0072b2' pt 7 lw 2 ps 1 title 'delta:tree', \
      $data1 using 1:2 with linespoints lc rgb '#0072b2' dt 4 pt 8 lw 2 ps 1 title 'delta:scene', \
      $data2 using 1:2 with linespoints lc rgb '#d55e00' pt 5 lw 2 ps 1 title 'decomposition', \

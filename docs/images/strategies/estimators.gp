@@ -52,8 +52,9 @@ set logscale y
 set format x '%g'
 set format y '%g'
 set grid xtics ytics lc rgb '#dddddd' lw 1 dt 1
-set key outside right center samplen 2
-set offsets graph 0.03, graph 0.03, 0, 0
+set key outside right center reverse Left samplen 2
+set xrange [0.08:1250]
+set xtics (0.1, 1, 10, 100, 1000)
 plot $data0 using 1:2 with linespoints lc rgb '#0072b2' pt 7 lw 2 ps 1 title 'delta:tree/analytic', \
      $data1 using 1:2 with linespoints lc rgb '#d55e00' pt 5 lw 2 ps 1 title 'delta:tree/ratio', \
      $data2 using 1:2 with linespoints lc rgb '#009e73' pt 9 lw 2 ps 1 title 'delta:tree/residual-ratio', \
