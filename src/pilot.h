@@ -17,6 +17,9 @@
 
 namespace clume {
 
+/// By how much another estimator must be ahead of the winner's own to replace it: more than the weights are off by.
+inline constexpr double pilot_margin = 1.3;
+
 struct PilotRow {
     MethodPair pair;
     double variance = 0;   ///< of one sample, mean over the pilot's pixels and channels

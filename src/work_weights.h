@@ -11,6 +11,6 @@
 namespace clume {
 
 /// Per operation of each kind (WORK_* of layout.h, names in work_names).
-inline constexpr std::array<double, WORK_KINDS> work_weights_ns = {13, 171, 8, 15, 7, 9, 76, 71, 43, 150};
+inline constexpr std::array<double, WORK_KINDS> work_weights_ns = {18, 192, 10, 27, 6, 10, 96, 47, 44, 116};
 
 }  // namespace clume

@@ -53,7 +53,8 @@ TEST_CASE("Pilot.ChoosesTheLeastInverseEfficiencyAgainAndAgain") {
             CHECK(row.work_ns == same.work_ns);
             CHECK(row.variance > 0);
             CHECK(row.work_ns > 0);
-            CHECK(pilot->rows[pilot->chosen].inverse_efficiency() <= row.inverse_efficiency());
+            CHECK(pilot->rows[pilot->chosen].inverse_efficiency() <= pilot_margin * row.inverse_efficiency());
+            if (row.pair.estimator == "analytic") CHECK(pilot->rows[pilot->chosen].inverse_efficiency() <= row.inverse_efficiency());
         }
         // Kept: the second time it is read.
         const auto again = run_pilot(other, options, folder.path(), go_on);
