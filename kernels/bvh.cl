@@ -19,11 +19,6 @@ static float8 bvh_test(__global const BvhNode* node, float3 o, float3 inverse, f
     return select((float8)CLUME_INFINITY, near, (near <= far) & (near < (float8)t_end));
 }
 
-static float3 bvh_inverse(float3 d) {
-    return (float3)(rcp_s(copysign(max_s(fabs(d.x), 0x1p-60f), d.x)), rcp_s(copysign(max_s(fabs(d.y), 0x1p-60f), d.y)),
-                    rcp_s(copysign(max_s(fabs(d.z), 0x1p-60f), d.z)));
-}
-
 /// Pushes the node's children that the ray enters before t_end, nearest on top; returns the new stack height.
 static int bvh_push(__global const BvhNode* node, float8 entry, float t_end, uint* stack, float* distance, int height) {
     const float* near = (const float*)&entry;
@@ -44,7 +39,7 @@ static int bvh_push(__global const BvhNode* node, float8 entry, float t_end, uin
 static void bvh_decompose(float3 o, float3 d, float t_begin, uint2 key, float* best, uint* primitive, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
     float distance[CLUME_BVH_STACK];
-    const float3 inverse = bvh_inverse(d);
+    const float3 inverse = ray_inverse(d);
     int height = bvh_push(nodes, bvh_test(nodes, o, inverse, t_begin, *best), *best, stack, distance, 0);
     while (height > 0) {
         height -= 1;
@@ -63,7 +58,7 @@ static void bvh_decompose(float3 o, float3 d, float t_begin, uint2 key, float* b
 /// Optical depth between t_begin and t_end, or any partial sum that has reached `limit`.
 static ulong bvh_depth(float3 o, float3 d, float t_begin, float t_end, ulong limit, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
-    const float3 inverse = bvh_inverse(d);
+    const float3 inverse = ray_inverse(d);
     ulong depth = 0;
     int height = 0;
     uint node = 0;

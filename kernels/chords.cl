@@ -104,7 +104,7 @@ static void gathering_insert(Gathering* g, const Chord* c, int i, float sigma, u
 static void gather(Gathering* g, float3 o, float3 d, float t_begin, float t_end, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
     float distance[CLUME_BVH_STACK];
-    const float3 inverse = bvh_inverse(d);
+    const float3 inverse = ray_inverse(d);
     g->chords.count = 0;
     g->window = t_end;
     int height = bvh_push(nodes, bvh_test(nodes, o, inverse, t_begin, t_end), t_end, stack, distance, 0);
@@ -225,7 +225,7 @@ static uint active_pick(const Chords* a, const int density, float t0, float t1, 
 /// unless it is null, *primitive becomes one of them by its share of the depth, u being uniform.
 static float streamed_depth(const int with_density, float3 o, float3 d, float t0, float t1, float* density, float u, uint* primitive, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
-    const float3 inverse = bvh_inverse(d);
+    const float3 inverse = ray_inverse(d);
     float sum = 0.0f;
     *density = 0.0f;
     int height = 0;
@@ -281,7 +281,7 @@ static float streamed_depth(const int with_density, float3 o, float3 d, float t0
 /// The segment that holds t: *begin, raised to the last end of a chord not after t, and *end, lowered to the first after it.
 static void streamed_segment(float3 o, float3 d, float t, float* begin, float* end, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
-    const float3 inverse = bvh_inverse(d);
+    const float3 inverse = ray_inverse(d);
     int height = 0;
     uint node = 0;
     for (;;) {

@@ -4,6 +4,7 @@
 // `delta`: null collisions under the bounds of the bricks, of a table of the grid's own, or one for all of it.
 // `progressive`: the same under bounds of the bricks that are learned.
 #include "grid_bounds.cl"
+#include "strategy_progressive.cl"
 #if CLUME_GRIDS
 
 /// Where the optical depth of grid g reaches tau, CLUME_INFINITY if not before t_end: through bricks, then cells.

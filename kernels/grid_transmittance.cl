@@ -41,10 +41,6 @@ static ulong grids_depth(ulong depth, float3 o, float3 d, float t_end, ulong lim
     return depth;
 }
 
-#ifndef CLUME_GRID_ROULETTE  // estimates below this one go on by roulette
-#define CLUME_GRID_ROULETTE 0.1f
-#endif
-
 /// `march`: steps from the ray's origin as grid_flight_march has them; biased.
 static float grid_march(uint g, float3 o, float3 d, float t_end, Work* work, SCENE_ARGS) {
     __global const GridInfo* grid = grids + g;
@@ -101,10 +97,7 @@ static float grid_ratio(const bool residual, uint g, float3 o, float3 d, float t
             COUNT(&f->work, WORK_DENSITIES, 1);
             // Rounding must not take a value below the brick's least one, nor the share above 1.
             weight *= max_s(fma(-max_s(sigma - control, 0.0f), inverse, 1.0f), 0.0f);
-            if (weight < CLUME_GRID_ROULETTE) {
-                if (!(uniform_s(draw & 1u ? bits.w : bits.y) * CLUME_GRID_ROULETTE < weight)) return 0.0f;
-                weight = CLUME_GRID_ROULETTE;
-            }
+            if (!weight_roulette(&weight, draw & 1u ? bits.w : bits.y)) return 0.0f;
             draw += 1;
             if (draw & 1u) {
                 tau = exponential_s(bits.z);

@@ -100,10 +100,15 @@ static uint groups_pick(uint first, uint count, float3 p, float target, SCENE_AR
     return last;
 }
 
+/// 1 / d for slab tests; an axis along which the ray does not move counts as 2^-60.
+static float3 ray_inverse(float3 d) {
+    return (float3)(rcp_s(copysign(max_s(fabs(d.x), 0x1p-60f), d.x)), rcp_s(copysign(max_s(fabs(d.y), 0x1p-60f), d.y)),
+                    rcp_s(copysign(max_s(fabs(d.z), 0x1p-60f), d.z)));
+}
+
 /// The part [t0, t1) of the ray, within [t_begin, t_end), that lies in the media's bounds; false if there is none.
 static bool bounds_clip(float3 o, float3 d, float t_begin, float t_end, float* t0, float* t1, __constant const RenderParams* params) {
-    const float3 inverse = (float3)(rcp_s(copysign(max_s(fabs(d.x), 0x1p-60f), d.x)), rcp_s(copysign(max_s(fabs(d.y), 0x1p-60f), d.y)),
-                                    rcp_s(copysign(max_s(fabs(d.z), 0x1p-60f), d.z)));
+    const float3 inverse = ray_inverse(d);
     const float3 a = (params->bounds_min.xyz - o) * inverse, b = (params->bounds_max.xyz - o) * inverse;
     *t0 = max_s(t_begin, max_s(min_s(a.x, b.x), max_s(min_s(a.y, b.y), min_s(a.z, b.z))));
     *t1 = min_s(t_end, min_s(max_s(a.x, b.x), min_s(max_s(a.y, b.y), max_s(a.z, b.z))));

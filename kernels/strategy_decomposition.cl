@@ -54,7 +54,7 @@ static bool decomposition_blocks(float3 o, float3 d, float t_end, uint2 key, Wor
     return false;
 #else
     uint stack[CLUME_BVH_STACK];
-    const float3 inverse = bvh_inverse(d);
+    const float3 inverse = ray_inverse(d);
     int height = 0;
     uint node = 0;
     for (;;) {

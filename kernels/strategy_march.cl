@@ -25,12 +25,8 @@ static int flight_march(float3 o, float3 d, float t_end, Flight* f, const Draws*
     const float last = w.t_end;
     float k = floor(divide_s(w.t, step));  // steps before this one; exact up to 2^24
 #else
-    const float3 inverse = bvh_inverse(d);
-    const float3 a = ((float3)(params->bounds_min.x, params->bounds_min.y, params->bounds_min.z) - o) * inverse;
-    const float3 b = ((float3)(params->bounds_max.x, params->bounds_max.y, params->bounds_max.z) - o) * inverse;
-    const float first = max_s(0.0f, max_s(min_s(a.x, b.x), max_s(min_s(a.y, b.y), min_s(a.z, b.z))));
-    const float last = min_s(t_end, min_s(max_s(a.x, b.x), min_s(max_s(a.y, b.y), max_s(a.z, b.z))));
-    if (!(first < last)) return FLIGHT_ESCAPED;
+    float first, last;
+    if (!bounds_clip(o, d, 0.0f, t_end, &first, &last, params)) return FLIGHT_ESCAPED;
     float k = floor(divide_s(first, step));
 #endif
     for (;;) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a program is told about the scene's voxel media, and what `--explain` says of them.
 #include <fmt/format.h>
-#include <iterator>
 
 #include "src/device_grids.h"
 
@@ -9,21 +8,12 @@ namespace clume {
 
 void define_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out) {
     if (scene.grids.empty()) return;
-    const auto define = [&](const char* name, std::size_t value) {
-        for (auto& [key, text] : out.defines)
-            if (key == name) return void(text = std::to_string(value));
-        out.defines.emplace_back(name, std::to_string(value));
-    };
+    const auto define = [&](const char* name, std::size_t value) { out.defines.emplace_back(name, std::to_string(value)); };
     define("CLUME_GRIDS", scene.grids.size());
     define("CLUME_GRID_LEVELS", traits.levels);
     define("CLUME_GRID_KINDS", traits.kinds);
     define("CLUME_GRID_BOUNDS", traits.tables);
     define("CLUME_GRID_EMISSION", traits.emission_grids);
-    define("CLUME_SCENE_BOUND", scene.render.bound == "scene");
-    const char* estimators[] = {"analytic", "march", "ratio", "residual-ratio", "binary"};
-    for (std::size_t i = 0; i < std::size(estimators); ++i)
-        if (out.transmittance == estimators[i]) define("CLUME_TRANSMITTANCE", i + 1);
-    if (scene.render.root_finding == "bisection") define("CLUME_BISECTION", 1);
 }
 
 void explain_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out) {
