@@ -20,6 +20,13 @@ constexpr std::size_t longest_name = 255;
 /// The most scan lines that are compressed together (DWAB).
 constexpr std::int64_t most_chunk_lines = 256;
 
+/// Types of one size: the library reads that much whatever the attribute says, and would be elsewhere afterwards.
+constexpr std::pair<std::string_view, std::size_t> fixed_sizes[] = {
+    {"box2f", 16}, {"box2i", 16},    {"chromaticities", 32}, {"compression", 1}, {"deepImageState", 1}, {"double", 8}, {"envmap", 1},
+    {"float", 4},  {"int", 4},       {"keycode", 28},        {"lineOrder", 1},   {"m33d", 72},          {"m33f", 36},  {"m44d", 128},
+    {"m44f", 64},  {"rational", 8},  {"tiledesc", 9},        {"timecode", 8},    {"v2d", 16},           {"v2f", 8},    {"v2i", 8},
+    {"v3d", 24},   {"v3f", 12},      {"v3i", 12}};
+
 /// Text up to a NUL.
 std::string_view name_of(ByteReader& in, std::string_view bytes) {
     const std::size_t end = bytes.find('\0', in.at());
@@ -43,6 +50,9 @@ class PartChecker {
             if (size < 0) in_.fail(fmt::format("corrupt EXR header: attribute {} of {} bytes", in_quotes(name), size));
             if (!names_.insert(name).second) in_.fail(fmt::format("corrupt EXR header: attribute {} stands twice", in_quotes(name)));
             const std::string_view value = in_.take(static_cast<std::uint64_t>(size));
+            for (const auto& [fixed, bytes] : fixed_sizes)
+                if (type == fixed && value.size() != bytes)
+                    in_.fail(fmt::format("corrupt EXR header: attribute {} of {} bytes, not {}", in_quotes(name), value.size(), bytes));
             ByteReader attribute(in_.name(), value);
             take(name, type, attribute, value);
         }
@@ -68,6 +78,7 @@ class PartChecker {
                 value.take(12);  // linearity and sampling; what is subsampled is counted in full
                 pixel_bytes_ += pixel_type == 1 ? 2 : 4;
             }
+            if (value.left() > 0) in_.fail("corrupt EXR header: a list of channels of another size");
         } else if (name == "tiles") {
             expect(name, type, "tiledesc");
             tile_width_ = value.get<std::uint32_t>();

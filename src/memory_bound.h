@@ -17,7 +17,7 @@ struct MemoryBound {
 /// A scene file alone: "[0,0,0" is a value of the tree for every two bytes. The files that it names add their own bounds, as
 /// often as it names them.
 constexpr MemoryBound scene_memory{512, 1 << 20};
-/// A primitive is 168 bytes and at least 7 of the file.
+/// A primitive is 160 bytes and at least 7 of the file.
 constexpr MemoryBound ply_memory{128, 1 << 20};
 /// .vol and .raw: a column one voxel wide makes a brick of 512 floats of every 8 samples.
 constexpr MemoryBound dense_memory{512, 1 << 20};

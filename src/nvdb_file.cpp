@@ -51,7 +51,7 @@ class GridBytes {
     GridBytes(const std::string& name, std::uint64_t byte_size)
         : name_(name), chunks_((byte_size + sizeof(Chunk) - 1) / sizeof(Chunk)), size_(byte_size) {}
 
-    char* data() { return chunks_.data()->bytes; }
+    char* data() { return reinterpret_cast<char*>(chunks_.data()); }
     std::uint64_t size() const { return size_; }
     [[noreturn]] void fail(const std::string& why) const { throw SceneError(fmt::format("{}: corrupt: {}", name_, why)); }
 
@@ -61,7 +61,7 @@ class GridBytes {
         at = from + static_cast<std::uint64_t>(offset);
         if (at % NANOVDB_DATA_ALIGNMENT != 0 || at > size_ || byte_size > size_ - at)
             fail(fmt::format("a node is to be at byte {} + {} of a grid of {} bytes", from, offset, size_));
-        return *reinterpret_cast<const Node*>(chunks_.data()->bytes + at);
+        return *reinterpret_cast<const Node*>(reinterpret_cast<const char*>(chunks_.data()) + at);
     }
 
   private:

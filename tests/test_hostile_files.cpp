@@ -77,6 +77,7 @@ TEST_CASE("HostileFiles.ClaimsCostNothing", "[quick]") {
     check(image_error(exr_head(65537, 1)), "each side must be in [1,65536]");
     const auto size = little(0x7fffffff, 4);
     check(image_error(exr_head(4, 4, std::string("owner\0string\0", 13) + size)), "cut short");
+    check(image_error(exr_head(4, 4, attribute("order", "lineOrder", "") + '\0')), "of 0 bytes, not 1");
     check(image_error(exr_head(4, 4, attribute("views", "stringvector", size))), "cut short");
     check(image_error(exr_head(4, 4, attribute("preview", "preview", little(60000, 4) + little(60000, 4)))), "a preview of another size");
     check(image_error(exr_head(4, 4, attribute("chunkCount", "int", size), 3, 0x1002)), "chunks in an EXR file");

@@ -19,7 +19,6 @@
 #include "src/ply_header.h"
 #include "src/scene_schema.h"
 #include "src/voxel_writer.h"
-#include "tests/fuzz/targets.h"
 #include "tests/library_voxels.h"
 
 namespace fs = std::filesystem;
@@ -120,14 +119,14 @@ void make_voxels(const fs::path& folder) {
         for (const std::uint32_t compression : {0u, 1u, 2u, 6u}) {
             given.kind = kind;
             given.map = compression == 0 ? "scale translate" : compression == 1 ? "affine" : "uniform scale";
-            write_library_vdb(folder / "vdb" / fmt::format("{}_{}.vdb", kind, compression), {given}, compression);
+            test::write_library_vdb(folder / "vdb" / fmt::format("{}_{}.vdb", kind, compression), {given}, compression);
         }
     given.kind = "float";
-    write_library_vdb(folder / "vdb/shared.vdb", {given, given}, 6, true);
+    test::write_library_vdb(folder / "vdb/shared.vdb", {given, given}, 6, true);
     for (const char* type : {"float", "double", "fp4", "fp8", "fp16", "fpn"})
         for (const char* codec : {"none", "zip", "blosc"}) {
             if (std::string_view(codec) != "none" && std::string_view(type) != "float") continue;
-            write_library_nvdb(folder / "nvdb" / fmt::format("{}_{}.nvdb", type, codec), {given}, codec, type);
+            test::write_library_nvdb(folder / "nvdb" / fmt::format("{}_{}.nvdb", type, codec), {given}, codec, type);
         }
 }
 
@@ -203,12 +202,10 @@ int main(int argc, char** argv) try {
         return 2;
     }
     const fs::path folder = argv[1];
-    for (const fuzz::Target* target : fuzz::targets) {
-        fs::create_directories(folder / target->name);
-        const fs::path kept = fs::path(CLUME_SOURCE_DIR) / "tests/fuzz/regressions" / target->name;
-        if (!fs::is_directory(kept)) continue;
-        for (const auto& entry : fs::directory_iterator(kept)) write(folder / target->name / ("regression_" + entry.path().filename().string()), bytes_of(entry.path()));
-    }
+    for (const char* target : {"vdb", "nvdb", "environment"}) fs::create_directories(folder / target);
+    const fs::path kept = fs::path(CLUME_SOURCE_DIR) / "tests/fuzz/regressions";
+    for (const auto& entry : fs::recursive_directory_iterator(kept))
+        if (entry.is_regular_file()) write(folder / entry.path().lexically_relative(kept), bytes_of(entry.path()));
     make_scenes(folder / "scene");
     make_plys(folder / "ply");
     make_voxels(folder);
