@@ -89,6 +89,11 @@ static float grid_flight_delta(uint g, float3 o, float3 d, float t_end, uint ran
 #if CLUME_STRATEGY == STRATEGY_PROGRESSIVE
         const uint index = bounds_learned(&w, grid);
         const float majorant = learned[index];
+        if (params->explore) {
+            const float place = progressive_place(bits.w, w.entry.link, t, min_s(w.t_exit, w.t_end));
+            const float sigma = bounds_value(&w, grid, place, grid_cells, grid_values);
+            if (sigma > majorant) atomic_max(raised + index, as_uint(sigma));
+        }
 #else
         const float majorant = w.entry.majorant;
 #endif

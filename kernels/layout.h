@@ -119,7 +119,7 @@ typedef struct RenderParams {
     uint film_width, seed_lo, seed_hi, light_count;
     int max_depth, rr_depth;
     float scene_bound;  // of the mixture's extinction, anywhere
-    uint pad0;
+    uint explore;       // 1: `progressive` also looks at one place in every cell that a ray crosses
 } RenderParams;
 
 typedef struct CellEntry {
