@@ -61,8 +61,9 @@ TEST_CASE("StudyScenes.Anisotropy", "[quick]") {
     BallSpec spec;
     spec.n = 4000;
     spec.overlap = 2;
-    spec.anisotropy = GENERATE(1., 10., 100.);
     spec.needles = GENERATE(false, true);
+    spec.anisotropy = GENERATE(1., 10., 100.);
+    if (spec.needles && spec.anisotropy > 10) return;  // longer than the ball: they reach out of it
     const Scene scene = bench::study_ball(spec);
     for (const std::size_t i : {0u, 1234u, 3999u}) {
         const glm::dmat3& a = scene.media[0].primitives[i].axes;
