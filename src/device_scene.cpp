@@ -2,7 +2,6 @@
 #include "src/device_scene.h"
 
 #include <algorithm>
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <fmt/format.h>
@@ -14,18 +13,11 @@
 #include "src/device_grids.h"
 #include "src/device_lights.h"
 #include "src/device_mixture.h"
+#include "src/device_values.h"
 #include "src/error.h"
 
 namespace clume {
 namespace {
-
-device::float4 pack(const glm::dvec3& v, double w = 0) {
-    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
-}
-
-bool is_grey(const glm::dvec3& v) { return v.x == v.y && v.y == v.z; }
-
-float as_float(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 template <class T>
 std::string hash_of(const std::vector<T>& v) {
@@ -61,7 +53,7 @@ MediaTraits pack_media(const Scene& scene, DeviceScene& out) {
             uniform_emission = uniform_emission && p.emission == first->emission;
             t.uniform_g = t.uniform_g && g == first_g;
             t.grey = t.grey && is_grey(p.albedo) && is_grey(p.emission);
-            const double most = std::max({p.emission.x, p.emission.y, p.emission.z});
+            const double most = largest(p.emission);
             t.brightest = std::max(t.brightest, most);
             if (most > 0) t.emission = 2;
         }
@@ -80,7 +72,7 @@ MediaTraits pack_media(const Scene& scene, DeviceScene& out) {
         uniform_emission = uniform_emission && p.emission == first->emission;
         t.uniform_g = t.uniform_g && m.phase.g == first_g;
         t.grey = t.grey && is_grey(m.albedo) && is_grey(m.emission);
-        const double most = std::max({p.emission.x, p.emission.y, p.emission.z});
+        const double most = largest(p.emission);
         t.brightest = std::max(t.brightest, most);
         if (most > 0) t.emission = 2;
     }
