@@ -15,6 +15,7 @@
 #include "src/device_mixture.h"
 #include "src/device_values.h"
 #include "src/error.h"
+#include "src/strategies.h"
 
 namespace clume {
 namespace {
@@ -179,11 +180,6 @@ std::string build_structures(const Structures& wanted, std::optional<int> majora
     return text;
 }
 
-/// Place of `name` in the list, counted from 1.
-int index_of(const std::string& name, std::initializer_list<const char*> names) {
-    return 1 + static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
-}
-
 std::string names(device::uint bits, std::initializer_list<const char*> all) {
     std::string s;
     for (const char* name : all) {
@@ -307,8 +303,8 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     define("CLUME_VISIBLE_BACKGROUND", lights.visible_background);
     define("CLUME_CHANNELS", grey ? 1 : 3);
     define("CLUME_DEPTH_LIMIT", r.max_depth >= 0);
-    define("CLUME_STRATEGY", index_of(out.strategy, {"decomposition", "delta", "march", "march-analytic", "regular", "regular-linear", "progressive"}));
-    define("CLUME_TRANSMITTANCE", index_of(out.transmittance, {"analytic", "march", "ratio", "residual-ratio", "binary"}));
+    define("CLUME_STRATEGY", find_strategy(out.strategy)->program);
+    define("CLUME_TRANSMITTANCE", find_estimator(out.transmittance)->program);
     define("CLUME_SCENE_BOUND", out.bound == "scene");
     if (r.root_finding == "bisection") define("CLUME_BISECTION", 1);
     define("CLUME_ACCEL", wanted.bvh ? 2 : 1);

@@ -21,7 +21,7 @@ constexpr std::uint32_t kPixels = 1024;     ///< at most
 constexpr std::uint32_t kSamples = 16;      ///< of each
 constexpr std::uint32_t kFirstSample = 0xc0000000u;  ///< numbers of their own: the image's noise is not what was chosen by
 constexpr std::size_t kFewPrimitives = 64;  ///< up to which one bound for the whole scene may be the cheapest
-constexpr int kVersion = 3;                 ///< of the candidates and of how they are measured
+constexpr int kVersion = 4;                 ///< of the candidates and of how they are measured
 
 /// `pixels` becomes the number rendered.
 PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const std::atomic<bool>& stop, std::uint32_t& pixels) {
@@ -64,7 +64,7 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const std::a
     std::size_t primitives = 0;
     for (const auto& m : scene.media) primitives += m.primitives.size();
     for (const Method& s : strategies()) {
-        if (s.kind != BiasKind::unbiased || !fits(s, scene)) continue;
+        if (s.kind != BiasKind::unbiased || !differs(s, scene)) continue;
         if (!s.null_collisions) candidates.push_back({s.name, estimator});
         else
             for (const char* bound : bounds()) {
@@ -89,7 +89,7 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const std::a
     if (scene.render.transmittance != "auto" || !samples_lights(scene)) return pilot;
     const MethodPair winner = pilot.rows[pilot.chosen].pair;
     for (const Method& e : estimators())
-        if (e.kind == BiasKind::unbiased && e.name != estimator && fits(e, scene)) pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, stop, pilot.pixels));
+        if (e.kind == BiasKind::unbiased && e.name != estimator) pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, stop, pilot.pixels));
     if (stop.load()) return {};
     const std::size_t best = best_of(pilot.rows);
     if (pilot_margin * pilot.rows[best].inverse_efficiency() < pilot.rows[pilot.chosen].inverse_efficiency()) pilot.chosen = best;
