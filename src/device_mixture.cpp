@@ -81,6 +81,12 @@ void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& elli
         out[i] = {slots[i].threshold, leaf.primitives[i], leaf.primitives[slots[i].other], scale(i) | scale(slots[i].other) << 16};
 }
 
+}  // namespace
+
+device::uint family_bit(KernelFamily k) {
+    return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
+}
+
 void pack_primitives(DeviceScene& out) {
     out.primitives.resize(out.ellipsoids.size());
     parallel_chunks(out.ellipsoids.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -96,12 +102,6 @@ void pack_primitives(DeviceScene& out) {
             p.medium = e.medium;
         }
     });
-}
-
-}  // namespace
-
-device::uint family_bit(KernelFamily k) {
-    return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
 }
 
 void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out) {

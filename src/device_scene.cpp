@@ -237,7 +237,8 @@ std::string DeviceScene::hash() const {
     return sha256_hex(all);
 }
 
-DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) {
+/// Without structures, what the scene itself is: every primitive, nothing to find one by.
+static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, bool with_structures) {
     DeviceScene out;
     out.normalization = normalize(scene);
     const MediaTraits traits = pack_media(scene, out);
@@ -247,14 +248,16 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     out.strategy = r.strategy != "auto" ? r.strategy : "delta";
     out.transmittance = r.transmittance != "auto" ? r.transmittance : "analytic";
     out.bound = r.bound != "auto" ? r.bound : out.strategy == "progressive" || r.majorant_grid ? "grid" : "tree";
-    const Structures wanted = structures_of(out, lights.nee != 0, options);
+    const Structures wanted = with_structures ? structures_of(out, lights.nee != 0, options) : Structures{};
 
     const auto start = std::chrono::steady_clock::now();
     out.ellipsoids = make_ellipsoids(scene, out.normalization);
     const Box bounds = bounds_of(out.ellipsoids);
     out.params.bounds_min = pack(bounds.lo);
     out.params.bounds_max = pack(bounds.hi);
-    const std::string accelerator = build_structures(wanted, r.majorant_grid, out);
+    std::string accelerator;
+    if (with_structures) accelerator = build_structures(wanted, r.majorant_grid, out);
+    else pack_primitives(out);
     const GridTraits voxels = pack_grids(scene, out);
     out.accelerator_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
@@ -335,6 +338,15 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     say("colour", grey ? "one channel: everything is grey" : "RGB");
     say("depth limit", r.max_depth >= 0 ? std::to_string(r.max_depth) : "left out");
     return out;
+}
+
+DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) { return pack_scene(scene, options, true); }
+
+std::string scene_hash(const Scene& scene, const RenderOptions& options) {
+    const DeviceScene packed = pack_scene(scene, options, false);
+    std::string all = packed.hash();
+    for (const auto& [name, value] : packed.defines) all += " " + name + "=" + value;
+    return sha256_hex(all);
 }
 
 }  // namespace clume
