@@ -15,6 +15,7 @@
 #include "src/input_file.h"
 #include "src/media_reader.h"
 #include "src/medium_keys.h"
+#include "src/memory_budget.h"
 #include "src/scene_schema.h"
 #include "src/voxel_grid.h"
 
@@ -133,8 +134,8 @@ Film read_film(const SectionReader& section) {
     const double needed = bytes_per_pixel * film.width * film.height, held = static_cast<double>(physical_memory_bytes());
     if (needed > held)
         section.fail(film.width >= film.height ? "width" : "height",
-                     fmt::format("a film of {} x {} needs {:.1f} GB of memory; this machine has {:.1f}", film.width,
-                                 film.height, needed * 1e-9, held * 1e-9));
+                     fmt::format("a film of {} x {} needs {} of memory; the limit is {} (--memory-limit)", film.width, film.height,
+                                 megabytes(needed), megabytes(held)));
     return film;
 }
 
