@@ -260,7 +260,7 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     const Refiner refiner{ellipsoids, cost, std::clamp(2.0 * spare, 1.5, 8.0), max_levels, 2.5 * choice.typical_cost, options.control};
     std::vector<Subtree> subtrees(roots);
     parallel_chunks(roots, 64, [&](std::size_t begin, std::size_t end) {
-        require_memory("cells", {{"to split them further", (end - begin) * 4096}});  // how far they split shows only on the way
+        if (begin % 1024 == 0) require_memory("cells", {{"to split them further", (end - begin) * 4096}});  // how far shows only on the way
         for (std::size_t r = begin; r < end; ++r) {
             const glm::dvec3 at(r % cells.roots.x, r / cells.roots.x % cells.roots.y, r / cells.roots.x / cells.roots.y);
             const Box box{cells.origin + at * cells.root_size, cells.origin + (at + 1.0) * cells.root_size};

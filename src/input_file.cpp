@@ -28,7 +28,7 @@ struct Descriptor {
 }  // namespace
 
 std::uint64_t physical_memory_bytes() {
-    return std::min(memory_limit(), static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)));
+    return std::min(memory_limit(), machine_memory());
 }
 
 std::string read_file_bytes(const std::filesystem::path& path) {

@@ -54,10 +54,12 @@ std::uint64_t free_in_machine() {
         std::uint64_t kilobytes = 0;
         if (words >> name >> kilobytes && name == "MemAvailable:") return kilobytes * 1024 + memory_in_use();
     }
-    return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+    return machine_memory();
 }
 
 }  // namespace
+
+std::uint64_t machine_memory() { return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)); }
 
 void set_memory_limit(std::uint64_t bytes) { limit = bytes; }
 
@@ -80,11 +82,9 @@ void require_memory(const std::string& name, const std::vector<MemoryNeed>& need
     if (sum <= memory_limit()) return;
     std::string parts = fmt::format("in use {:.1f}", static_cast<double>(used) / 1e6);
     for (const MemoryNeed& need : needs) parts += fmt::format(", {} {:.1f}", need.what, static_cast<double>(need.bytes) / 1e6);
-    throw SceneError(fmt::format("{}: needs {} of memory: {}; the limit is {} (--memory-limit)", name, megabytes(static_cast<double>(sum)), parts,
-                                 megabytes(static_cast<double>(memory_limit()))));
+    throw SceneError(fmt::format("{}: needs {:.1f} MB of memory: {}; the limit is {:.1f} MB (--memory-limit)", name, static_cast<double>(sum) / 1e6, parts,
+                                 static_cast<double>(memory_limit()) / 1e6));
 }
-
-std::string megabytes(double bytes) { return fmt::format("{:.1f} MB", bytes / 1e6); }
 
 std::uint64_t parse_byte_size(const std::string& flag, const std::string& text) {
     std::uint64_t value = 0;

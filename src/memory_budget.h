@@ -16,6 +16,9 @@ void set_memory_limit(std::uint64_t bytes);
 /// process used already.
 std::uint64_t memory_limit();
 
+/// Bytes of physical memory in this machine.
+std::uint64_t machine_memory();
+
 /// Bytes of memory that this process holds now (resident).
 std::uint64_t memory_in_use();
 
@@ -27,9 +30,6 @@ struct MemoryNeed {
 /// Throws SceneError if that, beside what is in use, would be more than the limit: "NAME: needs 812.0 MB: in use 300.0, film
 /// 512.0; the limit is 600.0 MB (--memory-limit)".
 void require_memory(const std::string& name, const std::vector<MemoryNeed>& needs);
-
-/// "1048.6 MB" of 10⁶ bytes.
-std::string megabytes(double bytes);
 
 /// "2G", "512M", "65536K", a number of bytes: powers of 1024. Throws UsageError naming `flag`.
 std::uint64_t parse_byte_size(const std::string& flag, const std::string& text);

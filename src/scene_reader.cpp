@@ -131,11 +131,11 @@ Film read_film(const SectionReader& section) {
     film.width = static_cast<int>(section.integer("width"));
     film.height = static_cast<int>(section.integer("height"));
     constexpr double bytes_per_pixel = 256;  // sums, squares and the images made of them
-    const double needed = bytes_per_pixel * film.width * film.height, held = static_cast<double>(physical_memory_bytes());
+    const double needed = bytes_per_pixel * film.width * film.height, held = static_cast<double>(machine_memory());
     if (needed > held)
         section.fail(film.width >= film.height ? "width" : "height",
-                     fmt::format("a film of {} x {} needs {} of memory; the limit is {} (--memory-limit)", film.width, film.height,
-                                 megabytes(needed), megabytes(held)));
+                     fmt::format("a film of {} x {} needs {:.1f} GB of memory; this machine has {:.1f}", film.width,
+                                 film.height, needed * 1e-9, held * 1e-9));
     return film;
 }
 

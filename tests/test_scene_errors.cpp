@@ -85,7 +85,7 @@ TEST_CASE("Scene.CameraAndFilmChecks", "[quick]") {
     check_error(camera, camera + ", \"fov\": 0", "s.json:2:65: ");
     check_error(camera, camera + ", \"type\": \"orthographic\"", "s.json:2:13: missing key \"width\"");
     check_error("\"width\": 32, \"height\": 16", "\"width\": 65536, \"height\": 65536",
-                "s.json:3:22: a film of 65536 x 65536 needs 1099511.6 MB of memory; the limit is ");
+                "s.json:3:22: a film of 65536 x 65536 needs 1099.5 GB of memory; this machine has ");
 }
 
 TEST_CASE("Scene.LightChecks", "[quick]") {
