@@ -120,8 +120,7 @@ int interrupted_early() {
     return interrupted_exit_code;
 }
 
-int run(const RenderCommand& command) {
-    install_interrupt_handlers();
+int render_scene(const RenderCommand& command) {
     if (command.memory_limit) set_memory_limit(*command.memory_limit);
     check_writable(command.exr);
     check_writable(command.png());
@@ -165,6 +164,17 @@ int run(const RenderCommand& command) {
     const int code = report(stats);
     for (const std::string& failure : saved.failures) say(failure);
     return saved.failures.empty() ? code : 1;
+}
+
+int run(const RenderCommand& command) {
+    install_interrupt_handlers();
+    try {
+        return render_scene(command);
+    } catch (const DeviceError&) {
+        // A compiler inside an OpenCL implementation clears away its files at a signal, and then fails for want of them.
+        if (stop_requested()) return interrupted_early();
+        throw;
+    }
 }
 
 int run(const CompareCommand& command) {

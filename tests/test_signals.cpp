@@ -20,7 +20,7 @@ using namespace clume::test;
 
 namespace {
 
-const Words job{"render", "puff.json", "--quiet", "--spp", "64", "-D", "film.width=200", "-D", "film.height=150"};
+const Words job{"render", "puff.json", "--quiet", "--spp", "24", "-D", "film.width=200", "-D", "film.height=150"};
 
 std::string bytes_of(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);
