@@ -61,7 +61,11 @@ void DeviceRenderer::aim(FilmSums& film, std::uint64_t seed) {
     aimed_ = false;
 }
 
-void DeviceRenderer::set_learned(std::span<const float> bounds) { learned_.assign(bounds.begin(), bounds.end()); }
+void DeviceRenderer::set_learned(std::span<const float> bounds, bool explore) {
+    learned_.assign(bounds.begin(), bounds.end());
+    params_.explore = explore;
+    aimed_ = false;
+}
 
 void DeviceRenderer::upload_changes() {
     if (!aimed_) scene_.params.upload(std::span(&params_, 1));

@@ -33,9 +33,9 @@ public:
     /// Batches from now on use `seed` and add to `film`, which must outlive them.
     void aim(FilmSums& film, std::uint64_t seed);
 
-    /// Bounds of `progressive` for the batches from now on, one per leaf; and the highest densities that batches so far have
-    /// found above them.
-    void set_learned(std::span<const float> bounds);
+    /// Bounds of `progressive` for the batches from now on, one per leaf, and whether rays look into every cell that they cross;
+    /// and the highest densities that batches so far have found above the bounds.
+    void set_learned(std::span<const float> bounds, bool explore);
     std::span<const float> raised() const { return raised_; }
 
     /// Work-items that fitted into the device's memory when a batch did not; 0 if all did.

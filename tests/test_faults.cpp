@@ -24,14 +24,14 @@ Words with(Words words, const Words& more) {
     return words;
 }
 
-struct Run {
+struct FaultRun {
     int code;
     std::string out, err;
     bool left_files = false;  ///< others than scene, EXR and PNG
     std::optional<RenderImage> image;
 
     /// `fault` as the layer has it.
-    Run(const std::string& fault, const Words& words) {
+    FaultRun(const std::string& fault, const Words& words) {
         const SceneFolder folder;
         Process process(words, folder.path, {"OPENCL_LAYERS=" CLUME_FAULT_LAYER, "CLUME_FAULT=" + fault});
         code = process.wait(240);
@@ -58,7 +58,7 @@ bool same(const RenderImage& a, const RenderImage& b) {
 const RenderImage& sound(const std::string& strategy = "delta") {
     static std::map<std::string, RenderImage> images;
     if (images.count(strategy) == 0) {
-        const Run run("", with(job, {"--strategy", strategy}));
+        const FaultRun run("", with(job, {"--strategy", strategy}));
         INFO(run.err);
         REQUIRE(run.code == 0);
         REQUIRE(run.warnings() == 0);
@@ -82,7 +82,7 @@ TEST_CASE("Faults.FailedDeviceIsDroppedAndItsBatchesRedone") {
     if (!two_cores()) return;
     for (const char* fault : {"kind=enqueue,n=2,device=1", "kind=enqueue,n=4,device=0", "kind=enqueue,n=3,device=1,code=-36", "kind=lost,n=2,device=1",
                               "kind=lost,n=4,device=0"}) {
-        const Run run(fault, with(job, split));
+        const FaultRun run(fault, with(job, split));
         INFO(fault << "\n" << run.err);
         CHECK(run.code == 0);
         CHECK(run.warnings() == 1);
@@ -97,7 +97,7 @@ TEST_CASE("Faults.ProgressiveKeepsWhatALostDeviceHadFound") {
     if (!two_cores()) return;
     const Words progressive = with(job, {"--strategy", "progressive"});
     for (const char* fault : {"kind=lost,n=3,device=1", "kind=lost,n=9,device=0"}) {
-        const Run run(fault, with(progressive, split));
+        const FaultRun run(fault, with(progressive, split));
         INFO(fault << "\n" << run.err);
         CHECK(run.code == 0);
         CHECK(run.warnings() == 1);
@@ -108,7 +108,7 @@ TEST_CASE("Faults.ProgressiveKeepsWhatALostDeviceHadFound") {
 
 TEST_CASE("Faults.LittleMemoryMeansSmallerBatches") {
     // No buffer above this: the scene's and the pixels' fit, a batch of 4,096 paths does not.
-    const Run small("kind=size,bytes=100000", job);
+    const FaultRun small("kind=size,bytes=100000", job);
     INFO(small.err);
     CHECK(small.code == 0);
     CHECK(small.warnings() == 1);
@@ -118,7 +118,7 @@ TEST_CASE("Faults.LittleMemoryMeansSmallerBatches") {
     // Any one allocation that fails: the set-up's end the render, with the call and the bytes; a batch's is made smaller.
     int ended = 0, first_of_batch = 0;
     for (int n = 1; n < 64 && first_of_batch == 0; n += n < 33 ? 8 : 1) {
-        const Run run("kind=buffer,times=1,n=" + std::to_string(n), job);
+        const FaultRun run("kind=buffer,times=1,n=" + std::to_string(n), job);
         INFO(n << "\n" << run.err);
         CHECK_FALSE(run.left_files);
         if (run.code == 4) {
@@ -136,20 +136,20 @@ TEST_CASE("Faults.LittleMemoryMeansSmallerBatches") {
     CHECK(ended > 0);
     REQUIRE(first_of_batch > 0);
     // No room for even the smallest batch.
-    const Run none("kind=buffer,n=" + std::to_string(first_of_batch), job);
+    const FaultRun none("kind=buffer,n=" + std::to_string(first_of_batch), job);
     INFO(none.err);
     CHECK(none.code == 4);
     CHECK_THAT(none.err, Catch::Contains("CL_MEM_OBJECT_ALLOCATION_FAILURE"));
 }
 
 TEST_CASE("Faults.BuildFailureNamesTheCall") {
-    const Run run("kind=build", job);
+    const FaultRun run("kind=build", job);
     INFO(run.err);
     CHECK(run.code == 4);
     CHECK_THAT(run.err, Catch::Contains("clBuildProgram: CL_BUILD_PROGRAM_FAILURE"));
     CHECK_FALSE(run.image);
     if (!two_cores()) return;
-    const Run one("kind=build,device=1", with(job, split));
+    const FaultRun one("kind=build,device=1", with(job, split));
     INFO(one.err);
     CHECK(one.code == 0);
     CHECK(one.warnings() == 1);
@@ -159,14 +159,14 @@ TEST_CASE("Faults.BuildFailureNamesTheCall") {
 
 TEST_CASE("Faults.LyingDeviceIsCaughtByTheSelfTest") {
     // The lowest bit of one number of each read.
-    const Run alone("kind=wrong", job);
+    const FaultRun alone("kind=wrong", job);
     INFO(alone.err);
     CHECK(alone.code == 4);
     CHECK_THAT(alone.err, Catch::Contains("fails its self-test"));
     CHECK_FALSE(alone.image);
     if (!two_cores()) return;
     for (const char* fault : {"kind=wrong,device=0", "kind=wrong,device=1,n=4"}) {
-        const Run run(fault, with(job, split));
+        const FaultRun run(fault, with(job, split));
         INFO(fault << "\n" << run.err);
         CHECK(run.code == 0);
         CHECK(run.warnings() == 1);
@@ -178,7 +178,7 @@ TEST_CASE("Faults.LyingDeviceIsCaughtByTheSelfTest") {
 
 TEST_CASE("Faults.WithNoDeviceLeftWhatWasDoneIsSaved") {
     for (const Words& words : two_cores() ? std::vector<Words>{job, with(job, split)} : std::vector<Words>{job}) {
-        const Run run("kind=lost,n=5", words);
+        const FaultRun run("kind=lost,n=5", words);
         INFO(run.err);
         CHECK(run.code == 4);
         CHECK_THAT(run.err, Catch::Contains("no device is left: the image holds"));
@@ -189,7 +189,7 @@ TEST_CASE("Faults.WithNoDeviceLeftWhatWasDoneIsSaved") {
         CHECK(*most > 0);
         CHECK(*least < 192);
     }
-    const Run nothing("kind=lost,n=2", job);
+    const FaultRun nothing("kind=lost,n=2", job);
     INFO(nothing.err);
     CHECK(nothing.code == 4);
     CHECK_FALSE(nothing.image);
@@ -199,7 +199,7 @@ TEST_CASE("Faults.HungKernelIsNamedAndTheProcessLeaves") {
     sound();  // so that nothing is compiled below
     const Words limited = with(job, {"--kernel-timeout", "3"});
     for (const char* fault : {"kind=hang,n=5", "kind=block,n=5"}) {
-        const Run run(fault, limited);
+        const FaultRun run(fault, limited);
         INFO(fault << "\n" << run.err);
         CHECK(run.code == 4);
         CHECK_THAT(run.err, Catch::Contains("kernel render gave no sign of life for 3 s") && Catch::Contains("the image holds"));
@@ -207,14 +207,14 @@ TEST_CASE("Faults.HungKernelIsNamedAndTheProcessLeaves") {
         REQUIRE(run.image);
         CHECK(*std::max_element(run.image->samples.begin(), run.image->samples.end()) > 0);
     }
-    const Run at_once("kind=block,kernel=probe_arithmetic", with(job, {"--kernel-timeout", "0.5"}));
+    const FaultRun at_once("kind=block,kernel=probe_arithmetic", with(job, {"--kernel-timeout", "0.5"}));
     INFO(at_once.err);
     CHECK(at_once.code == 4);
     CHECK_THAT(at_once.err, Catch::Contains("hangs"));
     CHECK_FALSE(at_once.image);
     if (!two_cores()) return;
     for (const char* fault : {"kind=hang,n=3,device=1", "kind=block,n=4,device=0"}) {
-        const Run run(fault, with(limited, split));
+        const FaultRun run(fault, with(limited, split));
         INFO(fault << "\n" << run.err);
         CHECK(run.code == 0);
         CHECK(run.warnings() == 1);

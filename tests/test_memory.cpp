@@ -14,11 +14,11 @@ using namespace clume::test;
 
 namespace {
 
-struct Run {
+struct Measured {
     int code;
     std::string err;
     std::size_t peak_bytes, files;
-    Run(Words words, const fs::path& folder) {
+    Measured(Words words, const fs::path& folder) {
         words.insert(words.begin(), {"render", "--quiet"});
         Process process(words, folder);
         code = process.wait(300);
@@ -40,7 +40,7 @@ std::string bytes(double count) { return std::to_string(static_cast<std::uint64_
 void check_budget(const Words& words, const fs::path& folder, double low) {
     Words little = words, enough = words;
     little.insert(little.end(), {"--memory-limit", bytes(low)});
-    const Run refused(little, folder);
+    const Measured refused(little, folder);
     INFO(refused.err);
     CHECK(refused.code == 3);
     CHECK_THAT(refused.err, Catch::Contains("in use") && Catch::Contains("the limit is") && Catch::Contains("--memory-limit"));
@@ -52,7 +52,7 @@ void check_budget(const Words& words, const fs::path& folder, double low) {
     for (int attempt = 0; attempt < 4; ++attempt) {
         Words given = words;
         given.insert(given.end(), {"--memory-limit", bytes(limit)});
-        const Run run(given, folder);
+        const Measured run(given, folder);
         INFO("limit " << limit / 1e6 << " MB, peak " << static_cast<double>(run.peak_bytes) / 1e6 << " MB, code " << run.code << "\n" << run.err);
         CHECK(static_cast<double>(run.peak_bytes) <= limit);
         if (run.code == 0) {
