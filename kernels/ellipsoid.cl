@@ -170,16 +170,18 @@ static vfloat flight_part(const Chord* c, vfloat sigma, vfloat t0, vfloat tau, u
 
 /// Sum of the 16 lanes of a group held in CLUME_PARTS vectors, always by the same pairs: i and i + 8, i + 4, i + 2, i + 1.
 static float reduce_lanes(const vfloat* v) {
+#if CLUME_WIDTH == 4
+    const float4 b = (v[0] + v[2]) + (v[1] + v[3]);
+#else
 #if CLUME_WIDTH == 16
     const float8 a = v[0].lo + v[0].hi;
 #elif CLUME_WIDTH == 8
     const float8 a = v[0] + v[1];
-#elif CLUME_WIDTH == 4
-    const float8 a = (float8)(v[0] + v[2], v[1] + v[3]);
 #else
     const float8 a = (float8)(v[0] + v[8], v[1] + v[9], v[2] + v[10], v[3] + v[11], v[4] + v[12], v[5] + v[13], v[6] + v[14], v[7] + v[15]);
 #endif
     const float4 b = a.lo + a.hi;
+#endif
     const float2 c = b.lo + b.hi;
     return c.x + c.y;
 }
