@@ -18,8 +18,7 @@ stage() {
     local title=$1 line status=0
     shift
     printf '\n==== %s\n' "$title"
-    "$@" > >(tee "$build/stage.log") || status=$?
-    wait $!
+    "$@" | tee "$build/stage.log" || status=$?
     line=$(tail -n 1 "$build/stage.log")
     if [[ $line =~ ^([0-9]+)\ passed,\ ([0-9]+)\ failed$ ]]; then
         ((passed += BASH_REMATCH[1], failed += BASH_REMATCH[2])) || true
