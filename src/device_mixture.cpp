@@ -6,13 +6,12 @@
 #include <cmath>
 
 #include "src/alias_table.h"
+#include "src/device_values.h"
 #include "src/error.h"
 #include "src/parallel.h"
 
 namespace clume {
 namespace {
-
-float as_float(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 /// Device groups out of lists of primitives: each list is cut by medium, then into sixteens.
 class GroupWriter {
@@ -82,6 +81,12 @@ void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& elli
         out[i] = {slots[i].threshold, leaf.primitives[i], leaf.primitives[slots[i].other], scale(i) | scale(slots[i].other) << 16};
 }
 
+}  // namespace
+
+device::uint family_bit(KernelFamily k) {
+    return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
+}
+
 void pack_primitives(DeviceScene& out) {
     out.primitives.resize(out.ellipsoids.size());
     parallel_chunks(out.ellipsoids.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -97,12 +102,6 @@ void pack_primitives(DeviceScene& out) {
             p.medium = e.medium;
         }
     });
-}
-
-}  // namespace
-
-device::uint family_bit(KernelFamily k) {
-    return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
 }
 
 void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out) {
@@ -145,7 +144,7 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
     });
     if (with_references) pack_primitives(out);
     device::RenderParams& p = out.params;
-    p.cells_origin = {static_cast<float>(cells.origin.x), static_cast<float>(cells.origin.y), static_cast<float>(cells.origin.z), static_cast<float>(1.0 / cells.root_size)};
+    p.cells_origin = pack(cells.origin, 1.0 / cells.root_size);
     p.cells_x = cells.roots.x;
     p.cells_y = cells.roots.y;
     p.cells_z = cells.roots.z;

@@ -13,6 +13,9 @@ namespace clume {
 /// FAMILY_* of layout.h.
 device::uint family_bit(KernelFamily kernel);
 
+/// One by one, in the order of out.ellipsoids.
+void pack_primitives(DeviceScene& out);
+
 /// Cells into the device scene. `with_groups`: for what visits chords or looks densities up by cell; `with_references`: for
 /// null collisions under the cells' bounds. Throws RenderError if there are too many.
 void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out);
