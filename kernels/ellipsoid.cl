@@ -11,7 +11,8 @@ typedef struct {
 } Chord;
 
 /// Whitens o − mu and d, and finds the chord inside whitened radius sqrt(e2); mask of lanes hit by the full line.
-/// t relative error some ulp of |o − mu|; d needs not be normalised.
+/// The points o + t d at entry and exit lie on the surface, ends error < 4 ulp of the radius; a hit is lost or invented by lines that
+/// are no farther than that from tangency. d needs not be normalised.
 static vint intersect(__global const float* part, float3 o, float3 d, float e2, Chord* c) {
     const vfloat x = o.x - vload_row(part), y = o.y - vload_row(part + 16), z = o.z - vload_row(part + 32);
     const vfloat w00 = vload_row(part + 48), w01 = vload_row(part + 64), w02 = vload_row(part + 80);
@@ -33,7 +34,7 @@ static vint intersect(__global const float* part, float3 o, float3 d, float e2, 
 }
 
 /// The same by the quadratic in S = Σ⁻¹ (rows: centre, then S xx xy xz yy yz zz), kept to be measured: the discriminant is taken
-/// at the foot of the perpendicular, as above, without whitening.
+/// at the foot of the perpendicular, as above, without whitening; ends error < 4 ulp of the radius.
 static vint intersect_quadratic(__global const float* part, float3 o, float3 d, float e2, Chord* c) {
     const vfloat x = o.x - vload_row(part), y = o.y - vload_row(part + 16), z = o.z - vload_row(part + 32);
     const vfloat xx = vload_row(part + 48), xy = vload_row(part + 64), xz = vload_row(part + 80);
@@ -54,7 +55,8 @@ static vint intersect_quadratic(__global const float* part, float3 o, float3 d, 
     return hit;
 }
 
-/// Extinction that each primitive adds at p, 0 outside its support.
+/// Extinction that each primitive adds at p, 0 outside its support: error < 1e-6 relative against the greatest and least within
+/// the intersection's limit of p.
 static vfloat density_part(__global const float* part, float3 p, uint family, vfloat e2) {
     const vfloat x = p.x - vload_row(part), y = p.y - vload_row(part + 16), z = p.z - vload_row(part + 32);
     const vfloat w00 = vload_row(part + 48), w01 = vload_row(part + 64), w02 = vload_row(part + 80);
@@ -72,7 +74,7 @@ static vfloat density_part(__global const float* part, float3 p, uint family, vf
 }
 
 /// ∫ 2/√π e^(−x²) from x0 to x1 = x0 + delta, |x| <= 6, without cancellation: midpoint series for short intervals, else by
-/// erfc of the side; relative error < 4e-6. delta >= 0 comes apart, since a short interval's ends do not know its length.
+/// erfc of the side; error < 4e-6 relative. delta >= 0 comes apart, since a short interval's ends do not know its length.
 static vfloat erf_between(vfloat x0, vfloat x1, vfloat delta) {
     const vfloat m = 0.5f * (x0 + x1);
     const vfloat f0 = erfc_v(fabs(x0)), f1 = erfc_v(fabs(x1));
@@ -90,7 +92,8 @@ static vfloat erf_between(vfloat x0, vfloat x1, vfloat delta) {
     return vselect(far, 1.12837917f * delta * series * fma(-e, low, e), near);
 }
 
-/// Optical depth of each primitive between t0 and t1 (t0 <= t1, inside its chord).
+/// Optical depth of each primitive between t0 and t1 (t0 <= t1, inside its chord): error < 6e-6 relative against lines within the
+/// intersection's limit, 0 below 2^-100. Split at any t, additivity error < 6e-6 relative; as t1 grows, monotonicity error < 6e-6 relative.
 static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uint family, vfloat e2) {
     vfloat depth = sigma * (t1 - t0);  // uniform
 #if CLUME_FAMILIES & FAMILY_GAUSSIAN
@@ -115,7 +118,8 @@ static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uin
 }
 
 /// t of each primitive's own collision for optical depth tau measured from t0 (inside the chord), or CLUME_INFINITY where its
-/// depth to the exit is less. Clamped to [t0, t_out], so that rounding loses no collision.
+/// depth to the exit is less: error < 6e-6 relative of tau, t and the line being off by no more than the intersection's limit.
+/// Clamped to [t0, t_out], so that rounding loses no collision.
 static vfloat flight_part(const Chord* c, vfloat sigma, vfloat t0, vfloat tau, uint family, vfloat e2) {
     vfloat t = t0;
     vint collides = sigma > (vfloat)0.0f;
