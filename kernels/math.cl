@@ -80,8 +80,9 @@ static float asin_s(float x) {
     const int big = a > 0.5f;
     const float z = big ? 0.5f * (1.0f - a) : a * a;
     const float r = big ? sqrt_s(z) : a;
-    const float p = r * fma(z, fma(z, fma(z, fma(z, fma(z, 4.263563517e-2f, 2.385817372e-2f), 4.555018440e-2f), 7.494434768e-2f), 1.666679011e-1f), 1.0f);
-    return copysign(big ? fma(-2.0f, p, 1.57079633f) : p, x);
+    const float q = fma(z, fma(z, fma(z, fma(z, 4.263563517e-2f, 2.385817372e-2f), 4.555018440e-2f), 7.494434768e-2f), 1.666679011e-1f);
+    const float p = fma(r * z, q, r);
+    return copysign(big ? fma(-2.0f, p, -4.37113883e-8f) + 1.57079637f : p, x);
 }
 
 /// Angle of (x, y) from +x in (−π, π], error < 3e-7 absolute; 0 for the origin.

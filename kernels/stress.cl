@@ -62,15 +62,14 @@ __kernel void stress_naive(__global const float* groups, __global const float4* 
     to[80] = flight;
 }
 
-/// Phase function and its sampling: in: direction and g; cosine to evaluate at (as float4.x); bits. Out: direction and its pdf;
-/// the value at the cosine.
-__kernel void stress_phase(__global const float4* d_g, __global const float* cosine, __global const uint4* bits, __global float4* out, __global float* value, uint count, uint kind) {
+/// Phase function and its sampling: in: direction and g; versine to evaluate at; bits. Out: direction and its pdf; the value there.
+__kernel void stress_phase(__global const float4* d_g, __global const float* versine, __global const uint4* bits, __global float4* out, __global float* value, uint count, uint kind) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
     float pdf;
     const float3 s = phase_sample(kind, d_g[i].w, d_g[i].xyz, bits[i], &pdf);
     out[i] = (float4)(s, pdf);
-    value[i] = phase_value(kind, d_g[i].w, d_g[i].w < 0.0f ? cosine[i] - 1.0f : 1.0f - cosine[i]);
+    value[i] = phase_value(kind, d_g[i].w, versine[i]);
 }
 
 /// Camera rays through film points: in: x, y (as_uint), u, v; out as probe_ray takes them.

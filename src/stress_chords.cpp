@@ -21,7 +21,8 @@ using oracle::Real;
 using oracle::Vector;
 
 constexpr float kNever = 1e30f;
-const double kUlp = 0x1p-23;  ///< of positions
+constexpr double kUlp = 0x1p-23;    ///< of positions
+constexpr double kFloor = 0x1p-98;  ///< what is below 2^-100 counts as 0
 
 double num(const Real& r) { return static_cast<double>(r); }
 Real real(float v) { return Real(static_cast<double>(v)); }
@@ -30,11 +31,12 @@ struct Limits {
     Limit ends = stated_limit("ellipsoid.cl", "intersect"), quadratic = stated_limit("ellipsoid.cl", "intersect_quadratic"), density = stated_limit("ellipsoid.cl", "density_part"),
           depth = stated_limit("ellipsoid.cl", "depth_part"), additivity = stated_limit("ellipsoid.cl", "depth_part", "additivity"),
           monotonicity = stated_limit("ellipsoid.cl", "depth_part", "monotonicity"), flight = stated_limit("ellipsoid.cl", "flight_part");
+    double quadratic_ratio = stated_number("ellipsoid.cl", "intersect_quadratic", "axis ratios up to");
 };
 
 /// All that the device says about one family's cases, lane 0 of every group.
 struct Answers {
-    std::vector<ProbeChord> used, quadratic, naive, density, first, second, back, early, late;
+    std::vector<ProbeChord> used, quadratic, naive, naive_flights, density, first, second, flights, early, late;
     std::vector<ProbeChord> rising[3];
 };
 
@@ -106,10 +108,10 @@ bool quadratic_of(const ChordCase& c, std::vector<float>& lane, oracle::Ellipsoi
 
 double beyond(const Real& off, const Real& size) { return off > 0 ? (size > 0 ? num(off / size) : INFINITY) : 0; }
 
-/// How far `got` lies outside what lines nearby have, as a share.
-double depth_error(const oracle::Range& range, double got) {
-    const Real least = range.lo < Real(0x1p-98) ? Real(0) : range.lo, value = got;
-    return std::max(beyond(least - value, least), got > 0x1p-98 ? beyond(value - range.hi, range.hi) : 0);
+/// How far `got` lies outside what lines nearby have, as a share; below `floor` all is 0.
+double outside(const oracle::Range& range, double got, double floor) {
+    const Real least = range.lo < Real(floor) ? Real(0) : range.lo, value = got;
+    return std::max(beyond(least - value, least), got > floor ? beyond(value - range.hi, range.hi) : 0);
 }
 
 StressError flight_error(const oracle::Line256& line, const ProbeGroupRay& ray, double got, double shift, double& relative) {
@@ -146,7 +148,7 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
     f.ends.naive = ends_error(c.device, line, c, {static_cast<double>(a.naive[i].t_in[0]), static_cast<double>(a.naive[i].t_out[0])}, ignored[0], ignored[1]).error;
     std::vector<float> lane;
     oracle::Ellipsoid256 q;
-    f.representable = quadratic_of(c, lane, q);
+    f.representable = quadratic_of(c, lane, q) && c.ratio <= limits.quadratic_ratio;
     if (f.representable) {
         const oracle::Line256 q_line(q, o, d);
         f.quadratic = ends_error(q, q_line, c, {static_cast<double>(a.quadratic[i].t_in[0]), static_cast<double>(a.quadratic[i].t_out[0])}, f.lost[1], f.invented[1]);
@@ -161,7 +163,7 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
         const Real exact = c.device.density_at(point);
         const double got = static_cast<double>(a.density[i].density[0]);
         f.density = compare_to(got, exact, LimitUnit::relative);
-        if (!f.density.nonfinite) f.density.error = depth_error(c.device.density_near(point, shift), got);
+        if (!f.density.nonfinite) f.density.error = outside(c.device.density_near(point, shift), got, kFloor * std::max(1.0, num(c.device.sigma)));
         const Real rounded = c.scene.density_at(point);
         f.density.rounding = rounded > 0 ? num(abs(exact - rounded) / rounded) : NAN;
     }
@@ -169,14 +171,14 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
     const Real t0 = real(ray.t0), t1 = real(ray.t1), exact = line.depth(t0, t1);
     const double got = static_cast<double>(a.used[i].depth[0]);
     f.depth = compare_to(got, exact, LimitUnit::relative);
-    const oracle::Range range = line.depth_near(t0, t1, shift);
-    if (!f.depth.nonfinite) f.depth.error = depth_error(range, got);
+    const oracle::Range range = line.depth_near(t0, t1, shift, line.brief() ? kUlp * std::abs(num(line.t_perp)) : 0);
+    if (!f.depth.nonfinite) f.depth.error = outside(range, got, kFloor);
     const Real rounded = scene_line.depth(t0, t1);
     if (rounded > 0) f.depth.rounding = num(abs(exact - rounded) / rounded);
     const double naive = static_cast<double>(a.naive[i].depth[0]);
-    f.depth.naive = std::isfinite(naive) ? depth_error(range, naive) : INFINITY;
-    if (exact > Real(0x1p-98)) f.naive_depth = std::isfinite(naive) ? num(abs(Real(naive) - exact) / exact) : INFINITY;
-    f.not_additive = std::abs(static_cast<double>(a.first[i].depth[0]) + static_cast<double>(a.second[i].depth[0]) - got) > limits.additivity.value * got + 0x1p-98;
+    f.depth.naive = std::isfinite(naive) ? outside(range, naive, kFloor) : INFINITY;
+    if (exact > Real(kFloor)) f.naive_depth = std::isfinite(naive) ? num(abs(Real(naive) - exact) / exact) : INFINITY;
+    f.not_additive = std::abs(static_cast<double>(a.first[i].depth[0]) + static_cast<double>(a.second[i].depth[0]) - got) > limits.additivity.value * got + kFloor;
     float before = a.first[i].depth[0];
     for (const auto& rise : a.rising) {
         f.not_monotone = f.not_monotone || static_cast<double>(rise[i].depth[0]) < static_cast<double>(before) * (1 - limits.monotonicity.value);
@@ -184,21 +186,21 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
     }
 
     const Real t = line.invert(t0, real(ray.tau));
-    f.collides = t >= 0 || a.used[i].flight[0] < kNever;
+    f.collides = t >= 0 || a.flights[i].flight[0] < kNever;
     double relative = NAN, naive_relative = NAN;
-    f.flight = flight_error(line, ray, static_cast<double>(a.used[i].flight[0]), shift, relative);
+    f.flight = flight_error(line, ray, static_cast<double>(a.flights[i].flight[0]), shift, relative);
     f.flight.relative = relative;
     if (f.flight.nonfinite) return f;
-    f.flight.naive = flight_error(line, ray, static_cast<double>(a.naive[i].flight[0]), shift, naive_relative).error;
-    f.naive_flight = t >= 0 && a.naive[i].flight[0] >= kNever ? 1 : naive_relative;
-    f.lost_flight = t >= 0 && a.used[i].flight[0] >= kNever;
-    f.invented_flight = t < 0 && a.used[i].flight[0] < kNever;
-    if (t >= 0 && a.used[i].flight[0] < kNever) f.flight.ulp = std::abs(num(Real(static_cast<double>(a.used[i].flight[0])) - t)) / kUlp;
+    f.flight.naive = flight_error(line, ray, static_cast<double>(a.naive_flights[i].flight[0]), shift, naive_relative).error;
+    f.naive_flight = t >= 0 && a.naive_flights[i].flight[0] >= kNever ? 1 : naive_relative;
+    f.lost_flight = t >= 0 && a.flights[i].flight[0] >= kNever;
+    f.invented_flight = t < 0 && a.flights[i].flight[0] < kNever;
+    if (t >= 0 && a.flights[i].flight[0] < kNever) f.flight.ulp = std::abs(num(Real(static_cast<double>(a.flights[i].flight[0])) - t)) / kUlp;
     const Real scene_t = scene_line.invert(t0, real(ray.tau));
     if (t >= 0 && scene_t >= 0) f.flight.rounding = num(abs(line.depth(t0, scene_t) - real(ray.tau)) / real(ray.tau));
-    if (a.used[i].flight[0] < kNever) {
+    if (a.flights[i].flight[0] < kNever) {
         const double tau = static_cast<double>(ray.tau), e = limits.flight.value + limits.depth.value;
-        f.no_round_trip = static_cast<double>(a.early[i].depth[0]) > tau * (1 + e) + 0x1p-98 || static_cast<double>(a.late[i].depth[0]) < tau * (1 - e);
+        f.no_round_trip = static_cast<double>(a.early[i].depth[0]) > tau * (1 + e) + kFloor || static_cast<double>(a.late[i].depth[0]) < tau * (1 - e);
     }
     return f;
 }
@@ -229,6 +231,10 @@ void ask_device(StressDevice& device, Work& w, StressRandom& random, double shif
     a.used = ask(w.rays);
     a.quadratic = probe.groups(w.rays, pack_groups(squares), bit, e2, true);
     a.naive = device.naive(w.rays, groups, bit, e2);
+    std::vector<ProbeGroupRay> open = w.rays;  // flights end where the chord does
+    for (ProbeGroupRay& r : open) r.t1 = kNever;
+    a.flights = ask(open);
+    a.naive_flights = device.naive(open, groups, bit, e2);
 
     // Splits and density points inside the chord, as the device sees it.
     std::vector<ProbeGroupRay> first = w.rays, second = w.rays, early = w.rays, late = w.rays, rising[3] = {w.rays, w.rays, w.rays};
@@ -246,7 +252,7 @@ void ask_device(StressDevice& device, Work& w, StressRandom& random, double shif
         rising[1][i].t1 = std::nextafter(rising[0][i].t1, kNever);
         rising[2][i].t1 = std::max(rising[1][i].t1, static_cast<float>(static_cast<double>(middle) * (1 + 1e-6)));
         w.density_rays[i].t0 = c.t_in[0] < kNever ? static_cast<float>(static_cast<double>(c.t_in[0]) + random.uniform() * (static_cast<double>(c.t_out[0]) - static_cast<double>(c.t_in[0]))) : middle;
-        const double flight = static_cast<double>(c.flight[0]);
+        const double flight = static_cast<double>(a.flights[i].flight[0]);
         early[i].t1 = static_cast<float>(flight - shift);
         late[i].t1 = static_cast<float>(flight + shift);
     }

@@ -57,10 +57,10 @@ std::vector<ProbeChord> StressDevice::naive(std::span<const ProbeGroupRay> rays,
     return out.download();
 }
 
-StressDevice::Phase StressDevice::phase(device::uint kind, std::span<const device::float4> directions, std::span<const float> cosines, std::span<const StressBits> bits) {
+StressDevice::Phase StressDevice::phase(device::uint kind, std::span<const device::float4> directions, std::span<const float> versines, std::span<const StressBits> bits) {
     Impl& s = *impl_;
     Buffer<device::float4> d(s.queue, directions), out(s.queue, directions.size());
-    Buffer<float> c(s.queue, cosines), value(s.queue, directions.size());
+    Buffer<float> c(s.queue, versines), value(s.queue, directions.size());
     Buffer<StressBits> b(s.queue, bits);
     s.run("stress_phase", nullptr, directions.size(), d, c, b, out, value, cl_uint(directions.size()), cl_uint(kind));
     return {out.download(), value.download()};

@@ -28,10 +28,10 @@ public:
 
     struct Phase {
         std::vector<device::float4> directions;  ///< w: pdf
-        std::vector<float> values;               ///< at the cosines given
+        std::vector<float> values;               ///< at the versines given
     };
     /// directions[i].w is g.
-    Phase phase(device::uint kind, std::span<const device::float4> directions, std::span<const float> cosines, std::span<const StressBits> bits);
+    Phase phase(device::uint kind, std::span<const device::float4> directions, std::span<const float> versines, std::span<const StressBits> bits);
 
     struct FilmPoint {
         std::uint32_t x, y;

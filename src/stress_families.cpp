@@ -64,8 +64,7 @@ Primitive place(const ChordFamily& f, StressRandom& random, double extent, Probe
     ray.t1 = static_cast<float>(std::min(1e30, t + u1 / w));
     if (f.denormal && random.below(2)) ray.t0 = static_cast<float>(random.spread(1e-44, 1e-38));
     if (!(ray.t1 > ray.t0)) ray.t1 = std::nextafter(ray.t0, 1e30f);
-    ray.tau = static_cast<float>(density * random.spread(1e-6, 3));
-    if (f.denormal && random.below(3) == 0) ray.tau = static_cast<float>(random.spread(1e-44, 1e-38));
+    ray.tau = static_cast<float>(std::max(0x1p-33, density * random.spread(1e-6, 3)));
     about.ratio = ratio;
     about.distance = glm::length(p.center - o) * w;
     about.density = density;

@@ -20,7 +20,10 @@ struct Limit {
 /// first stands. Functions of math_body.inc.cl are called "FN(exp)". Throws std::logic_error if nothing is stated.
 Limit stated_limit(const std::string& file, const std::string& function, const std::string& name = "");
 
-/// The same in the text of one file.
+/// The number that follows `before` in the function's comment, such as the end of a domain.
+double stated_number(const std::string& file, const std::string& function, const std::string& before);
+
+/// A limit in the text of one file.
 Limit limit_in(const std::string& text, const std::string& function, const std::string& name = "");
 
 /// "relative", "absolute", "ulp", "ulp of radius"

@@ -162,10 +162,10 @@ Real Line256::depth_at(const Real& d, Real u0, Real u1) const {
 
 Real Line256::depth(const Real& t0, const Real& t1) const { return depth_at(distance, w * (t0 - t_perp), w * (t1 - t_perp)); }
 
-Range Line256::depth_near(const Real& t0, const Real& t1, const Real& shift) const {
-    const Real u0 = w * (t0 - t_perp), u1 = w * (t1 - t_perp), middle = (u0 + u1) / 2, step = shift * along_, aside = shift * across_;
+Range Line256::depth_near(const Real& t0, const Real& t1, const Real& shift, const Real& blur) const {
+    const Real more = w * blur, u0 = w * (t0 - t_perp), u1 = w * (t1 - t_perp), middle = (u0 + u1) / 2, step = shift * along_, aside = shift * across_;
     const Real nearer = abs(middle) <= step ? Real(-middle) : middle > 0 ? Real(-step) : step, farther = middle > 0 ? step : Real(-step);
-    return {depth_at(distance + aside, u0 + farther, u1 + farther), depth_at(std::max(Real(0), Real(distance - aside)), u0 + nearer, u1 + nearer)};
+    return {depth_at(distance + aside, u0 + farther + more, u1 + farther - more), depth_at(std::max(Real(0), Real(distance - aside)), u0 + nearer - more, u1 + nearer + more)};
 }
 
 Real Line256::invert(const Real& t0, const Real& tau) const {

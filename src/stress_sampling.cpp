@@ -145,6 +145,7 @@ struct LightFamily {
     const char* name;
     LightKind kind;
     double size[2], distance[2];  ///< of the light, and from it to the point, normalised lengths
+    bool in_radii = false;        ///< the distance is in radii of the sphere
 };
 constexpr LightFamily kLights[] = {{"constant", LightKind::constant, {1, 1}, {1, 1}},
                                    {"directional", LightKind::directional, {1, 1}, {1, 1}},
@@ -152,7 +153,7 @@ constexpr LightFamily kLights[] = {{"constant", LightKind::constant, {1, 1}, {1,
                                    {"spot", LightKind::spot, {1, 1}, {1e-3, 1e3}},
                                    {"sphere", LightKind::sphere, {0.01, 1}, {0.1, 3}},
                                    {"sphere, small and far", LightKind::sphere, {1e-7, 1e-3}, {0.3, 1.5}},
-                                   {"sphere, next to it", LightKind::sphere, {0.1, 1}, {1e-4, 0.05}},
+                                   {"sphere, next to it", LightKind::sphere, {0.1, 1}, {0.01, 0.05}, true},
                                    {"rectangle", LightKind::rectangle, {0.01, 1}, {0.05, 1.5}},
                                    {"rectangle, small and far", LightKind::rectangle, {1e-7, 1e-3}, {0.3, 1.5}}};
 
@@ -175,7 +176,7 @@ Light make_light(const LightFamily& f, StressRandom& random, double size) {
 /// The exact sample for the same bits.
 struct LightTruth {
     Vector direction, end;
-    Real pdf = 0, value = 0;
+    Real pdf = 0, value = 0, falloff = 1;  ///< of a spot: its value is judged beside the unattenuated one
     bool lit = true;
 };
 
@@ -203,9 +204,9 @@ LightTruth light_truth(const device::LightInfo& l, const Vector& o, const Stress
             if (l.kind == LIGHT_POINT) break;
             const Vector axis = oracle::unit(exact(l.axis));
             const Real angle = acos(-oracle::dot(s.direction, axis));
-            const Real falloff = std::min(Real(1), Real((Real(static_cast<double>(l.axis.w)) - angle) * Real(static_cast<double>(l.edge_u.x))));
-            s.lit = falloff > 0;
-            s.value *= falloff;
+            s.falloff = std::min(Real(1), Real((Real(static_cast<double>(l.axis.w)) - angle) * Real(static_cast<double>(l.edge_u.x))));
+            s.lit = s.falloff > 0;
+            s.value *= s.falloff;
             break;
         }
         case LIGHT_SPHERE: {
@@ -258,7 +259,7 @@ void stress_lights(StressDevice& device, const StressOptions& options, StressRes
             const glm::dvec3 at(light.position.x, light.position.y, light.position.z);
             for (std::size_t i = 0; i < n; ++i) {
                 const double gap = random.spread(f.distance[0], f.distance[1]);
-                const double away = f.kind == LightKind::sphere ? static_cast<double>(light.position.w) * (f.distance[0] < 1e-3 ? 1 + gap : 1) + (f.distance[0] < 1e-3 ? 0 : gap) : gap;
+                const double radius = f.kind == LightKind::sphere ? static_cast<double>(light.position.w) : 0, away = f.in_radii ? radius * (1 + gap) : radius + gap;
                 points[i] = pack(f.kind == LightKind::constant || f.kind == LightKind::directional ? glm::dvec3(0) : at + away * some_direction(random), 0);
                 bits[2 * i] = some_bits(random), bits[2 * i + 1] = some_bits(random);
             }
@@ -278,6 +279,7 @@ void stress_lights(StressDevice& device, const StressOptions& options, StressRes
                 directions.push_back(error_of(ok ? oracle::distance(direction, truth.direction) : Real(0), ok, where));
                 if (truth.pdf > 0) pdfs.push_back(compare_to(static_cast<double>(s.pdf), truth.pdf, pdf_limit.unit)), pdfs.back().at = where;
                 values.push_back(compare_to(static_cast<double>(s.value), truth.value, value_limit.unit));
+                values.back().error *= std::min(1.0, num(truth.falloff));
                 values.back().at = where;
                 if (f.kind == LightKind::constant || f.kind == LightKind::directional || !ok) continue;
                 const Vector end = oracle::along(exact(points[i]), direction, Real(static_cast<double>(s.distance)));
@@ -367,7 +369,8 @@ void stress_cameras(StressDevice& device, const StressOptions& options, StressRe
                 const std::string at = fmt::format("eye {:.3g} radii away, film point ({} + {:.9g}, {} + {:.9g}): o ({:.9g}, {:.9g}, {:.9g}), d ({:.9g}, {:.9g}, {:.9g})", away, points[i].x, points[i].u, points[i].y, points[i].v,
                                                    r.origin[0], r.origin[1], r.origin[2], r.direction[0], r.direction[1], r.direction[2]);
                 const bool ok = finite({r.origin[0], r.origin[1], r.origin[2], r.direction[0], r.direction[1], r.direction[2]});
-                StressError origin = error_of(oracle::distance(oracle::vector(r.origin), o) * Real(0x1p23), ok, at), direction = error_of(oracle::distance(oracle::vector(r.direction), d), ok, at);
+                const Real ulps = Real(0x1p23) / std::max(Real(1), Real(sqrt(oracle::dot(o, o))));  // of the radius, or of the place where that is farther out
+                StressError origin = error_of(oracle::distance(oracle::vector(r.origin), o) * ulps, ok, at), direction = error_of(oracle::distance(oracle::vector(r.direction), d), ok, at);
                 const Vector between{o[0] - scene_o[0], o[1] - scene_o[1], o[2] - scene_o[2]};
                 origin.rounding = num(oracle::distance(o, oracle::along(scene_o, scene_d, oracle::dot(between, scene_d)))) * 0x1p23;
                 direction.rounding = num(oracle::distance(d, scene_d));
