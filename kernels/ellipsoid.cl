@@ -11,7 +11,7 @@ typedef struct {
 } Chord;
 
 /// Whitens o − mu and d, and finds the chord inside whitened radius sqrt(e2); mask of lanes hit by the full line.
-/// The points o + t d at entry and exit lie on the surface, ends error < 4 ulp of the radius; a hit is lost or invented by lines that
+/// The points o + t d at entry and exit lie on the surface, ends error < 2 ulp of the radius; a hit is lost or invented by lines that
 /// are no farther than that from tangency. d needs not be normalised.
 static vint intersect(__global const float* part, float3 o, float3 d, float e2, Chord* c) {
     const vfloat x = o.x - vload_row(part), y = o.y - vload_row(part + 16), z = o.z - vload_row(part + 32);
@@ -34,7 +34,7 @@ static vint intersect(__global const float* part, float3 o, float3 d, float e2, 
 }
 
 /// The same by the quadratic in S = Σ⁻¹ (rows: centre, then S xx xy xz yy yz zz), kept to be measured: the discriminant is taken
-/// at the foot of the perpendicular, as above, without whitening; ends error < 4 ulp of the radius
+/// at the foot of the perpendicular, as above, without whitening; ends error < 2 ulp of the radius
 /// for axis ratios up to 30: the floats of Σ⁻¹ square them.
 static vint intersect_quadratic(__global const float* part, float3 o, float3 d, float e2, Chord* c) {
     const vfloat x = o.x - vload_row(part), y = o.y - vload_row(part + 16), z = o.z - vload_row(part + 32);
@@ -95,11 +95,11 @@ static vfloat erf_between(vfloat x0, vfloat x1, vfloat delta) {
 
 /// Optical depth of each primitive between t0 and t1 (t0 <= t1, inside its chord): error < 6e-6 relative against lines within the
 /// intersection's limit, 0 below 2^-100. Split at any t, additivity error < 6e-6 relative; as t1 grows, monotonicity error < 6e-6 relative.
-/// Beside a chord whose reach is less than 2^-8 of its distance, an interval's ends count as known to an ulp.
+/// Beside a chord whose half is less than 2^-5 of its distance, an interval's ends count as known to an ulp.
 static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uint family, vfloat e2) {
     // Entry and exit are rounded: a chord that is brief beside its distance is stretched from its floats to its true length.
     const vfloat reach = 0.5f * (c->t_out - c->t_in), per_half = rcp_v(vselect((vfloat)1.0f, reach, reach > (vfloat)0x1p-60f));
-    const vint brief = reach < 0x1p-8f * fabs(c->t_perp);
+    const vint brief = reach < 0x1p-5f * fabs(c->t_perp);
     vfloat depth = sigma * vselect((vfloat)1.0f, c->h * c->inverse_w * per_half, brief) * (t1 - t0);  // uniform
 #if CLUME_FAMILIES & FAMILY_GAUSSIAN
     if (family == FAMILY_GAUSSIAN) {

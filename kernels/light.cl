@@ -124,8 +124,9 @@ typedef struct {
 
 #if CLUME_NEE
 /// Chooses one light, then a direction; false if the choice cannot light o. `bits` and `more` are 8 words of their own.
-/// direction error < 5e-7 absolute; its end on the light, end error < 4 ulp of the radius (of the distance if that is greater); pdf error < 3e-6 relative, value error < 3e-6 relative (to the
-/// unattenuated value for a spot); points on a sphere's own scale, a hundredth of its radius or more off it.
+/// direction error < 1e-6 absolute; its end on the light, end error < 3 ulp of the radius (of the distance if that is greater);
+/// pdf error < 3e-6 relative, value error < 3e-6 relative, both for a rectangle seen at a cosine c over c, the value for a spot
+/// to the unattenuated one; from a sphere a hundredth of its radius or more off it.
 static bool light_sample(float3 o, uint4 bits, uint4 more, LightSample* s, __constant const RenderParams* params, __global const LightInfo* lights, __global const float4* texels, __global const AliasEntry* alias) {
     const float choice = uniform_s(bits.x);
     uint i = NO_LIGHT;

@@ -230,6 +230,7 @@ int run(const StressCommand& command) {
     const std::vector<DeviceInfo> devices = select_devices(command.devices);
     const bool json_on_stdout = command.json && *command.json == "-";
     if (command.json && !json_on_stdout) check_writable(*command.json);
+    if (command.report) check_stress_report(*command.report);
     std::vector<StressResult> results;
     for (const DeviceInfo& device : devices) {
         PartReporter progress("stressing " + device.label(), command.quiet);

@@ -73,12 +73,13 @@ void bin_plot(StressPlot& plot) {
     std::map<int, StressPlot::Point> bins;
     for (const auto& p : plot.points) {
         const int k = static_cast<int>(std::floor(2 * std::log10(p.x)));
-        auto& bin = bins.try_emplace(k, StressPlot::Point{std::pow(10.0, 0.5 * k + 0.25), NAN, NAN}).first->second;
+        auto& bin = bins.try_emplace(k, StressPlot::Point{std::pow(10.0, 0.5 * k + 0.25), NAN, NAN, NAN}).first->second;
         const auto raise = [](double& to, double v) {
             if (!(v <= to) && !std::isnan(v)) to = v;
         };
         raise(bin.used, p.used);
         raise(bin.naive, p.naive);
+        raise(bin.other, p.other);
     }
     plot.points.clear();
     for (const auto& [k, p] : bins) plot.points.push_back(p);

@@ -61,9 +61,9 @@ struct StressRow {
 /// Errors over one property of the cases: of the kernels' method and of the textbook's.
 struct StressPlot {
     struct Point {
-        double x, used, naive;
+        double x, used, naive, other = NAN;
     };
-    std::string name, title, naive_name, x_label, y_label;
+    std::string name, title, naive_name, other_name, x_label, y_label;  ///< other_name is empty where there is no third method
     std::vector<Point> points;  ///< worst per bin of x
 };
 

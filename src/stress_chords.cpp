@@ -48,7 +48,7 @@ struct Ends {
 /// What one case gave.
 struct Findings {
     StressError ends, quadratic, density, depth, flight;
-    bool lost[2]{}, invented[2]{}, representable = true, hit = false, collides = false;
+    bool lost[2]{}, invented[2]{}, judged = true, hit = false, collides = false;
     bool lost_flight = false, invented_flight = false, not_additive = false, not_monotone = false, no_round_trip = false;
     double naive_depth = NAN, naive_flight = NAN;  ///< relative, nothing forgiven
 };
@@ -148,8 +148,10 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
     f.ends.naive = ends_error(c.device, line, c, {static_cast<double>(a.naive[i].t_in[0]), static_cast<double>(a.naive[i].t_out[0])}, ignored[0], ignored[1]).error;
     std::vector<float> lane;
     oracle::Ellipsoid256 q;
-    f.representable = quadratic_of(c, lane, q) && c.ratio <= limits.quadratic_ratio;
-    if (f.representable) {
+    const bool ellipsoid = quadratic_of(c, lane, q);
+    f.judged = ellipsoid && c.ratio <= limits.quadratic_ratio;
+    if (!ellipsoid) f.quadratic.error = NAN;
+    if (ellipsoid) {
         const oracle::Line256 q_line(q, o, d);
         f.quadratic = ends_error(q, q_line, c, {static_cast<double>(a.quadratic[i].t_in[0]), static_cast<double>(a.quadratic[i].t_out[0])}, f.lost[1], f.invented[1]);
         if (q_line.hit() && scene_line.hit()) f.quadratic.rounding = num(q.surface_distance(oracle::along(o, d, scene_line.t_in()), sqrt(q.e2))) / kUlp;
@@ -178,7 +180,7 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
     const double naive = static_cast<double>(a.naive[i].depth[0]);
     f.depth.naive = std::isfinite(naive) ? outside(range, naive, kFloor) : INFINITY;
     if (exact > Real(kFloor)) f.naive_depth = std::isfinite(naive) ? num(abs(Real(naive) - exact) / exact) : INFINITY;
-    f.not_additive = std::abs(static_cast<double>(a.first[i].depth[0]) + static_cast<double>(a.second[i].depth[0]) - got) > limits.additivity.value * got + kFloor;
+    f.not_additive = std::abs(static_cast<double>(a.first[i].depth[0]) + static_cast<double>(a.second[i].depth[0]) - got) > limits.additivity.value * got + kFloor * std::max(1.0, 8 * c.density);
     float before = a.first[i].depth[0];
     for (const auto& rise : a.rising) {
         f.not_monotone = f.not_monotone || static_cast<double>(rise[i].depth[0]) < static_cast<double>(before) * (1 - limits.monotonicity.value);
@@ -199,7 +201,7 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
     const Real scene_t = scene_line.invert(t0, real(ray.tau));
     if (t >= 0 && scene_t >= 0) f.flight.rounding = num(abs(line.depth(t0, scene_t) - real(ray.tau)) / real(ray.tau));
     if (a.flights[i].flight[0] < kNever) {
-        const double tau = static_cast<double>(ray.tau), e = limits.flight.value + limits.depth.value;
+        const double tau = static_cast<double>(ray.tau), blur = line.brief() ? num(2 * kUlp * abs(line.t_perp) / line.reach()) : 0, e = limits.flight.value + limits.depth.value + blur;
         f.no_round_trip = static_cast<double>(a.early[i].depth[0]) > tau * (1 + e) + kFloor || static_cast<double>(a.late[i].depth[0]) < tau * (1 - e);
     }
     return f;
@@ -282,9 +284,9 @@ void add_rows(const Work& w, std::vector<Findings>& found, const Limits& limits,
     };
     const auto all = [](const Findings&) { return true; };
     const auto chord_row = [&](const char* quantity, const char* function, const Limit& limit, StressError Findings::*member, int k) {
-        StressRow row = stress_row(quantity, function, family + ", " + kernel, limit, collect(member, [&](const Findings& f) { return k == 0 || f.representable; }), options);
+        StressRow row = stress_row(quantity, function, family + ", " + kernel, limit, collect(member, [&](const Findings& f) { return k == 0 || f.judged; }), options);
         for (const Findings& f : found) {
-            if (k == 1 && !f.representable) continue;
+            if (k == 1 && !f.judged) continue;
             const bool far = (f.*member).error > row.limit.value;
             row.lost.of += f.hit, row.lost.count += f.lost[k];
             row.invented.of += !f.hit, row.invented.count += f.invented[k];
@@ -328,7 +330,7 @@ void add_points(const Work& w, const std::vector<Findings>& found, std::vector<S
         for (std::size_t i = 0; i < found.size(); ++i) {
             const Findings& f = found[i];
             const double x = w.cases[i].*(kAxes[k].value);
-            plots[3 * k].points.push_back({x, f.ends.error, f.ends.naive});
+            plots[3 * k].points.push_back({x, f.ends.error, f.ends.naive, f.quadratic.error});
             plots[3 * k + 1].points.push_back({x, f.depth.relative, f.naive_depth});
             plots[3 * k + 2].points.push_back({x, f.flight.relative, f.naive_flight});
         }
@@ -338,9 +340,9 @@ void add_points(const Work& w, const std::vector<Findings>& found, std::vector<S
 std::vector<StressPlot> empty_plots() {
     std::vector<StressPlot> plots;
     for (const Axis& axis : kAxes) {
-        plots.push_back({std::string("ends_") + axis.name, "Entry and exit: distance to the surface", "c − b²/a", axis.label, "ulp of the scene’s radius", {}});
-        plots.push_back({std::string("depth_") + axis.name, "Optical depth, Gaussian", "erf(b) − erf(a)", axis.label, "relative error", {}});
-        plots.push_back({std::string("flight_") + axis.name, "Free flight, Gaussian: depth at the point found", "inversion from t = 0", axis.label, "relative error", {}});
+        plots.push_back({std::string("ends_") + axis.name, "Entry and exit: distance to the surface", "c − b²/a", "quadratic in Σ⁻¹", axis.label, "ulp of the scene’s radius", {}});
+        plots.push_back({std::string("depth_") + axis.name, "Optical depth, Gaussian", "erf(b) − erf(a)", "", axis.label, "relative error", {}});
+        plots.push_back({std::string("flight_") + axis.name, "Free flight, Gaussian: depth at the point found", "inversion from t = 0", "", axis.label, "relative error", {}});
     }
     return plots;
 }

@@ -72,8 +72,9 @@ public:
     /// Depths of lines moved by up to `shift`, t being measured from the moved origin; of intervals whose ends are each off
     /// by up to `blur`.
     Range depth_near(const Real& t0, const Real& t1, const Real& shift, const Real& blur = 0) const;
-    /// As depth_part means it: half the chord is less than 2^-8 of its distance.
-    bool brief() const { return half_ / w < abs(t_perp) / 255; }
+    /// As depth_part means it: half the chord is less than 2^-5 of its distance.
+    bool brief() const { return half_ / w < abs(t_perp) / 31.9; }
+    Real reach() const { return half_ / w; }  ///< half the chord, in t
     /// t at which the depth from t0 reaches tau; negative if the chord ends before.
     Real invert(const Real& t0, const Real& tau) const;
 

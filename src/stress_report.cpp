@@ -98,6 +98,10 @@ Plot plot_of(const StressPlot& p) {
         plot.series[0].points.push_back({point.x, point.used});
         plot.series[1].points.push_back({point.x, point.naive});
     }
+    if (!p.other_name.empty()) {
+        plot.series.push_back({p.other_name, {}});
+        for (const auto& point : p.points) plot.series[2].points.push_back({point.x, point.other});
+    }
     return plot;
 }
 
@@ -228,6 +232,8 @@ void write_stress_json(const fs::path& path, std::span<const StressResult> resul
         for (const StressPlot& p : r.plots) {
             out.StartObject();
             put(out, "name", p.name);
+            put(out, "naive_is", p.naive_name);
+            if (!p.other_name.empty()) put(out, "other_is", p.other_name);
             out.Key("points");
             out.StartArray();
             for (const auto& point : p.points) {
@@ -235,6 +241,7 @@ void write_stress_json(const fs::path& path, std::span<const StressResult> resul
                 put(out, "x", point.x);
                 put(out, "used", point.used);
                 put(out, "naive", point.naive);
+                if (!p.other_name.empty()) put(out, "other", point.other);
                 out.EndObject();
             }
             out.EndArray();
@@ -248,6 +255,16 @@ void write_stress_json(const fs::path& path, std::span<const StressResult> resul
     const std::string text = std::string(buffer.GetString(), buffer.GetSize()) + "\n";
     if (path == "-") std::fwrite(text.data(), 1, text.size(), stdout);
     else write_file(path, text);
+}
+
+void check_stress_report(const fs::path& folder) {
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) throw RenderError(folder.string() + ": cannot be made: " + error.message());
+    if (fs::exists(folder / "stability.md")) return check_writable(folder / "stability.md");
+    const fs::path page = folder / "index.html";
+    if (fs::exists(page) && read_file(page).find("<title>clume stress</title>") == std::string::npos) throw RenderError(page.string() + ": is no page of clume stress; nothing was changed");
+    check_writable(page);
 }
 
 fs::path write_stress_report(const fs::path& folder, std::span<const StressResult> results) {

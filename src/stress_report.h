@@ -17,6 +17,9 @@ std::string stress_table(const StressResult& result);
 /// Numbers that are not finite are null. "-": stdout. Throws RenderError.
 void write_stress_json(const std::filesystem::path& path, std::span<const StressResult> results);
 
+/// Makes sure of the folder, before a long run. Throws RenderError.
+void check_stress_report(const std::filesystem::path& folder);
+
 /// Returns the page written. Throws RenderError.
 std::filesystem::path write_stress_report(const std::filesystem::path& folder, std::span<const StressResult> results);
 

@@ -176,7 +176,8 @@ Light make_light(const LightFamily& f, StressRandom& random, double size) {
 /// The exact sample for the same bits.
 struct LightTruth {
     Vector direction, end;
-    Real pdf = 0, value = 0, falloff = 1;  ///< of a spot: its value is judged beside the unattenuated one
+    Real pdf = 0, value = 0;
+    Real weight = 1;  ///< of relative errors: a spot's falloff, the cosine at a rectangle
     bool lit = true;
 };
 
@@ -204,9 +205,9 @@ LightTruth light_truth(const device::LightInfo& l, const Vector& o, const Stress
             if (l.kind == LIGHT_POINT) break;
             const Vector axis = oracle::unit(exact(l.axis));
             const Real angle = acos(-oracle::dot(s.direction, axis));
-            s.falloff = std::min(Real(1), Real((Real(static_cast<double>(l.axis.w)) - angle) * Real(static_cast<double>(l.edge_u.x))));
-            s.lit = s.falloff > 0;
-            s.value *= s.falloff;
+            s.weight = std::min(Real(1), Real((Real(static_cast<double>(l.axis.w)) - angle) * Real(static_cast<double>(l.edge_u.x))));
+            s.lit = s.weight > 0;
+            s.value *= s.weight;
             break;
         }
         case LIGHT_SPHERE: {
@@ -225,6 +226,7 @@ LightTruth light_truth(const device::LightInfo& l, const Vector& o, const Stress
             s.direction = oracle::unit(to);
             const Real cosine = -oracle::dot(s.direction, n);
             s.lit = cosine > 0;
+            s.weight = cosine;
             s.pdf = select * oracle::dot(to, to) / (cosine * Real(static_cast<double>(l.position.w)));
             s.value = radiance / s.pdf;
             break;
@@ -277,9 +279,9 @@ void stress_lights(StressDevice& device, const StressOptions& options, StressRes
                 const bool ok = finite({s.direction[0], s.direction[1], s.direction[2], s.distance, s.value, s.pdf});
                 const Vector direction = oracle::vector(s.direction);
                 directions.push_back(error_of(ok ? oracle::distance(direction, truth.direction) : Real(0), ok, where));
-                if (truth.pdf > 0) pdfs.push_back(compare_to(static_cast<double>(s.pdf), truth.pdf, pdf_limit.unit)), pdfs.back().at = where;
+                if (truth.pdf > 0) pdfs.push_back(compare_to(static_cast<double>(s.pdf), truth.pdf, pdf_limit.unit)), pdfs.back().at = where, pdfs.back().error *= std::min(1.0, num(truth.weight));
                 values.push_back(compare_to(static_cast<double>(s.value), truth.value, value_limit.unit));
-                values.back().error *= std::min(1.0, num(truth.falloff));
+                values.back().error *= std::min(1.0, num(truth.weight));
                 values.back().at = where;
                 if (f.kind == LightKind::constant || f.kind == LightKind::directional || !ok) continue;
                 const Vector end = oracle::along(exact(points[i]), direction, Real(static_cast<double>(s.distance)));
