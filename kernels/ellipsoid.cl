@@ -95,12 +95,14 @@ static vfloat erf_between(vfloat x0, vfloat x1, vfloat delta) {
 
 /// Optical depth of each primitive between t0 and t1 (t0 <= t1, inside its chord): error < 6e-6 relative against lines within the
 /// intersection's limit, 0 below 2^-100. Split at any t, additivity error < 6e-6 relative; as t1 grows, monotonicity error < 6e-6 relative.
-/// Beside a chord whose half is less than 2^-5 of its distance, an interval's ends count as known to an ulp.
+/// On a chord whose half is less than 2^-5 of its distance, an interval's ends count as known to an ulp, and a uniform chord's own.
 static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uint family, vfloat e2) {
+    vfloat depth = sigma * (t1 - t0);  // uniform
+#if CLUME_FAMILIES & (FAMILY_GAUSSIAN | FAMILY_EPANECHNIKOV)
     // Entry and exit are rounded: a chord that is brief beside its distance is stretched from its floats to its true length.
     const vfloat reach = 0.5f * (c->t_out - c->t_in), per_half = rcp_v(vselect((vfloat)1.0f, reach, reach > (vfloat)0x1p-60f));
     const vint brief = reach < 0x1p-5f * fabs(c->t_perp);
-    vfloat depth = sigma * vselect((vfloat)1.0f, c->h * c->inverse_w * per_half, brief) * (t1 - t0);  // uniform
+#endif
 #if CLUME_FAMILIES & FAMILY_GAUSSIAN
     if (family == FAMILY_GAUSSIAN) {
         const vfloat scale = 0.707106781f * vselect(c->w, c->h * per_half, brief);  // x = from + scale (t − base)
@@ -115,7 +117,7 @@ static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uin
         const vfloat s0 = per_half * vselect(t0 - c->t_in, c->t_out - t1, later);
         const vfloat s1 = per_half * vselect(t1 - c->t_in, c->t_out - t0, later);
         const vfloat shape = (s0 + s1) - (1.0f / 3.0f) * fma(s0, s0, fma(s0, s1, s1 * s1));
-        depth *= (e2 - c->d2) * rcp_v(e2) * shape;  // h² / E²
+        depth *= (e2 - c->d2) * rcp_v(e2) * shape * vselect((vfloat)1.0f, c->h * c->inverse_w * per_half, brief);  // h² / E²
     }
 #endif
     return vselect((vfloat)0.0f, depth, depth > (vfloat)0x1p-100f);

@@ -65,11 +65,12 @@ std::string script(const std::string& name, const Plot& p, const std::string& ma
         data += "EOD\n";
         plots += fmt::format("{}$data{} using 1:2 with linespoints {} lw 2 ps 1 title '{}'", i ? ", \\\n     " : "plot ", i, style(p.series[i].name, i), p.series[i].name);
     }
+    const std::string labels = fmt::format("{:g}", fmt::join(tics, ", "));
     const std::string axes = fmt::format(
         "set title '{}'\nset xlabel '{}'\nset ylabel '{}'\n{}{}set format x '%g'\nset format y '%g'\nset grid xtics ytics lc rgb '#dddddd' lw 1 dt 1\n"
         "set key outside right center reverse Left samplen 2\nset xrange [{:.6g}:{:.6g}]\nset xtics {}\n{}\n",
         quoted(p.title), quoted(p.x_label), quoted(p.y_label), p.log_x ? "set logscale x\n" : "", p.log_y ? "set logscale y\n" : "", least, most,
-        tics.size() > 12 ? std::string("autofreq") : fmt::format("({:g})", fmt::join(tics, ", ")), plots);
+        labels.size() > 72 ? std::string("autofreq") : "(" + labels + ")", plots);
     return fmt::format("# Made by {3}; `gnuplot {0}.gp` in this folder makes the plot again.\nset encoding utf8\n{1}"
                        "set terminal svg size 900,480 dynamic noenhanced font 'sans-serif,14' background 'white'\nset output '{0}.svg'\n{2}"
                        "set terminal pngcairo size 1260,672 noenhanced font 'sans,14' fontscale 1.3 linewidth 1.4 pointscale 1.4 background 'white'\n"

@@ -59,7 +59,7 @@ std::string StressRow::trouble() const {
     const std::pair<const char*, const StressCount&> counts[] = {{"hits lost", lost_beyond}, {"hits invented", invented_beyond}, {"additivity violated", additivity},
                                                                  {"monotonicity violated", monotonicity}, {"round trips missed", round_trip}};
     for (const auto& [what, c] : counts)
-        if (c.count > 0) add(fmt::format("{} {} of {}", c.count, what, c.of));
+        if (c.count > 0) add(fmt::format("{} {} of {}{}", c.count, what, c.of, c.at.empty() ? "" : ", first at " + c.at));
     return text;
 }
 
@@ -69,20 +69,24 @@ bool StressResult::holds() const {
     return std::all_of(rows.begin(), rows.end(), [](const StressRow& r) { return r.holds(); });
 }
 
-void bin_plot(StressPlot& plot) {
-    std::map<int, StressPlot::Point> bins;
+void bin_plot(StressPlot& plot, double share) {
+    std::map<int, std::vector<double>> bins[3];
     for (const auto& p : plot.points) {
         const int k = static_cast<int>(std::floor(2 * std::log10(p.x)));
-        auto& bin = bins.try_emplace(k, StressPlot::Point{std::pow(10.0, 0.5 * k + 0.25), NAN, NAN, NAN}).first->second;
-        const auto raise = [](double& to, double v) {
-            if (!(v <= to) && !std::isnan(v)) to = v;
-        };
-        raise(bin.used, p.used);
-        raise(bin.naive, p.naive);
-        raise(bin.other, p.other);
+        const double values[] = {p.used, p.naive, p.other};
+        for (int i = 0; i < 3; ++i) {
+            auto& bin = bins[i][k];
+            if (!std::isnan(values[i])) bin.push_back(values[i]);
+        }
     }
+    const auto quantile = [&](std::vector<double>& v) {
+        if (v.empty()) return static_cast<double>(NAN);
+        const auto at = v.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+        std::nth_element(v.begin(), at, v.end());
+        return *at;
+    };
     plot.points.clear();
-    for (const auto& [k, p] : bins) plot.points.push_back(p);
+    for (auto& [k, used] : bins[0]) plot.points.push_back({std::pow(10.0, 0.5 * k + 0.25), quantile(used), quantile(bins[1][k]), quantile(bins[2][k])});
 }
 
 StressResult run_stress(const DeviceInfo& info, const StressOptions& options, const std::function<void(double)>& progress) {

@@ -41,6 +41,11 @@ struct StressSpread {
 /// A kind of violation, counted against `of` trials; of = 0: it does not apply.
 struct StressCount {
     std::size_t count = 0, of = 0;
+    std::string at = {};  ///< inputs of the first
+    void add(bool violated, const std::string& where) {
+        ++of;
+        if (violated && count++ == 0) at = where;
+    }
 };
 
 struct StressRow {
@@ -64,7 +69,7 @@ struct StressPlot {
         double x, used, naive, other = NAN;
     };
     std::string name, title, naive_name, other_name, x_label, y_label;  ///< other_name is empty where there is no third method
-    std::vector<Point> points;  ///< worst per bin of x
+    std::vector<Point> points;  ///< one per half decade of x
 };
 
 struct StressResult {

@@ -202,7 +202,9 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
     if (t >= 0 && scene_t >= 0) f.flight.rounding = num(abs(line.depth(t0, scene_t) - real(ray.tau)) / real(ray.tau));
     if (a.flights[i].flight[0] < kNever) {
         const double tau = static_cast<double>(ray.tau), blur = line.brief() ? num(2 * kUlp * abs(line.t_perp) / line.reach()) : 0, e = limits.flight.value + limits.depth.value + blur;
-        f.no_round_trip = static_cast<double>(a.early[i].depth[0]) > tau * (1 + e) + kFloor || static_cast<double>(a.late[i].depth[0]) < tau * (1 - e);
+        // A flight that ends as near the exit as the exit is known has been judged by the lines beside it.
+        const bool at_exit = a.flights[i].flight[0] + static_cast<float>(shift) >= a.flights[i].t_out[0];
+        f.no_round_trip = static_cast<double>(a.early[i].depth[0]) > tau * (1 + e) + kFloor || (!at_exit && static_cast<double>(a.late[i].depth[0]) < tau * (1 - e));
     }
     return f;
 }
@@ -249,6 +251,7 @@ void ask_device(StressDevice& device, Work& w, StressRandom& random, double shif
         const double part = random.below(2) ? random.uniform() : random.spread(1e-4, 1);
         float middle = static_cast<float>(static_cast<double>(begin) + part * (static_cast<double>(end) - static_cast<double>(begin)));
         middle = std::clamp(middle, r.t0, std::max(r.t0, r.t1));
+        w.middles.push_back(middle);
         first[i].t1 = second[i].t0 = middle;
         rising[0][i].t1 = std::nextafter(middle, kNever);
         rising[1][i].t1 = std::nextafter(rising[0][i].t1, kNever);
@@ -263,7 +266,7 @@ void ask_device(StressDevice& device, Work& w, StressRandom& random, double shif
 }
 
 std::string describe(const ChordCase& c) {
-    return fmt::format("ratio {:.3g}, distance {:.3g} scales, density {:.3g}, t0 {:.9g}, t1 {:.9g}, tau {:.6g}, o ({:.9g}, {:.9g}, {:.9g}), d ({:.9g}, {:.9g}, {:.9g}), lane {:.9g}", c.ratio, c.distance, c.density,
+    return fmt::format("ratio {:.3g}, distance {:.3g} scales, density {:.3g}, t0 {:.9g}, t1 {:.9g}, tau {:.6g}, o ({:.9g}, {:.9g}, {:.9g}), d ({:.9g}, {:.9g}, {:.9g}), mu, W, sigma {:.9g}", c.ratio, c.distance, c.density,
                        c.ray.t0, c.ray.t1, c.ray.tau, c.ray.origin[0], c.ray.origin[1], c.ray.origin[2], c.ray.direction[0], c.ray.direction[1], c.ray.direction[2],
                        fmt::join(c.lane.begin(), c.lane.begin() + CLUME_ROW_ID, " "));
 }
@@ -273,7 +276,9 @@ const char* kernel_name(KernelFamily k) { return k == KernelFamily::gaussian ? "
 void add_rows(const Work& w, std::vector<Findings>& found, const Limits& limits, const StressOptions& options, StressResult& result) {
     const std::string family = w.family.name, kernel = kernel_name(w.kernel);
     for (std::size_t i = 0; i < found.size(); ++i) {
-        const std::string at = describe(w.cases[i]);
+        const Answers& a = w.answers;
+        const std::string at = describe(w.cases[i]) + fmt::format(": t {:.9g} to {:.9g}, depth {:.9g}, flight {:.9g}; depths to {:.9g} and from there {:.9g} {:.9g}, to the flight -+ {:.9g} {:.9g}", a.used[i].t_in[0],
+                                                                  a.used[i].t_out[0], a.used[i].depth[0], a.flights[i].flight[0], w.middles[i], a.first[i].depth[0], a.second[i].depth[0], a.early[i].depth[0], a.late[i].depth[0]);
         for (StressError* e : {&found[i].ends, &found[i].quadratic, &found[i].density, &found[i].depth, &found[i].flight}) e->at = at;
     }
     const auto collect = [&](auto member, auto wanted) {
@@ -301,14 +306,14 @@ void add_rows(const Work& w, std::vector<Findings>& found, const Limits& limits,
     StressRow depth = stress_row("optical depth", "depth_part", family + ", " + kernel, limits.depth, collect(&Findings::depth, all), options);
     StressRow flight = stress_row("free flight", "flight_part", family + ", " + kernel, limits.flight, collect(&Findings::flight, all), options);
     for (const Findings& f : found) {
-        depth.additivity.of += 1, depth.additivity.count += f.not_additive;
-        depth.monotonicity.of += 1, depth.monotonicity.count += f.not_monotone;
+        depth.additivity.add(f.not_additive, f.depth.at);
+        depth.monotonicity.add(f.not_monotone, f.depth.at);
+        if (f.collides) flight.round_trip.add(f.no_round_trip, f.flight.at);
         const bool far = f.flight.error > flight.limit.value;
         flight.lost.of += f.collides, flight.lost.count += f.lost_flight;
         flight.invented.of += f.collides, flight.invented.count += f.invented_flight;
         flight.lost_beyond.of += f.collides, flight.lost_beyond.count += f.lost_flight && far;
         flight.invented_beyond.of += f.collides, flight.invented_beyond.count += f.invented_flight && far;
-        flight.round_trip.of += f.collides, flight.round_trip.count += f.no_round_trip;
     }
     result.rows.push_back(depth);
     result.rows.push_back(flight);
@@ -340,9 +345,9 @@ void add_points(const Work& w, const std::vector<Findings>& found, std::vector<S
 std::vector<StressPlot> empty_plots() {
     std::vector<StressPlot> plots;
     for (const Axis& axis : kAxes) {
-        plots.push_back({std::string("ends_") + axis.name, "Entry and exit: distance to the surface", "c − b²/a", "quadratic in Σ⁻¹", axis.label, "ulp of the scene’s radius", {}});
-        plots.push_back({std::string("depth_") + axis.name, "Optical depth, Gaussian", "erf(b) − erf(a)", "", axis.label, "relative error", {}});
-        plots.push_back({std::string("flight_") + axis.name, "Free flight, Gaussian: depth at the point found", "inversion from t = 0", "", axis.label, "relative error", {}});
+        plots.push_back({std::string("ends_") + axis.name, "Entry and exit: distance to the surface, worst", "c − b²/a", "quadratic in Σ⁻¹", axis.label, "ulp of the scene’s radius", {}});
+        plots.push_back({std::string("depth_") + axis.name, "Optical depth, Gaussian: 90 % of the cases are below", "erf(b) − erf(a)", "", axis.label, "relative error", {}});
+        plots.push_back({std::string("flight_") + axis.name, "Free flight, Gaussian, by depth: 90 % of the cases are below", "inversion from t = 0", "", axis.label, "relative error", {}});
     }
     return plots;
 }
@@ -369,7 +374,7 @@ void stress_chords(StressDevice& device, const StressOptions& options, StressRes
             progress(static_cast<double>(seed++) / total);
         }
     for (StressPlot& plot : plots) {
-        bin_plot(plot);
+        bin_plot(plot, plot.name.starts_with("ends") ? 1 : 0.9);
         result.plots.push_back(std::move(plot));
     }
 }

@@ -147,10 +147,10 @@ Line256::Line256(const Ellipsoid256& e, const Vector& o, const Vector& d) : e_(e
 
 Real Line256::tangency() const { return abs(sqrt(e_.e2) - distance) / gradient_; }
 
-Real Line256::depth_at(const Real& d, Real u0, Real u1) const {
+Real Line256::depth_at(const Real& d, Real u0, Real u1, const Real& more) const {
     const Real square = e_.e2 - d * d;
     if (!(square > 0)) return 0;
-    const Real h = sqrt(square);
+    const Real h = e_.family == KernelFamily::uniform ? Real(sqrt(square) + more) : Real(sqrt(square));
     u0 = std::max(u0, Real(-h));
     u1 = std::min(u1, h);
     if (!(u0 < u1)) return 0;
@@ -165,7 +165,7 @@ Real Line256::depth(const Real& t0, const Real& t1) const { return depth_at(dist
 Range Line256::depth_near(const Real& t0, const Real& t1, const Real& shift, const Real& blur) const {
     const Real more = w * blur, u0 = w * (t0 - t_perp), u1 = w * (t1 - t_perp), middle = (u0 + u1) / 2, step = shift * along_, aside = shift * across_;
     const Real nearer = abs(middle) <= step ? Real(-middle) : middle > 0 ? Real(-step) : step, farther = middle > 0 ? step : Real(-step);
-    return {depth_at(distance + aside, u0 + farther + more, u1 + farther - more), depth_at(std::max(Real(0), Real(distance - aside)), u0 + nearer - more, u1 + nearer + more)};
+    return {depth_at(distance + aside, u0 + farther + more, u1 + farther - more, -more), depth_at(std::max(Real(0), Real(distance - aside)), u0 + nearer - more, u1 + nearer + more, more)};
 }
 
 Real Line256::invert(const Real& t0, const Real& tau) const {

@@ -70,7 +70,7 @@ public:
     /// Depth between t0 and t1, clipped to the chord.
     Real depth(const Real& t0, const Real& t1) const;
     /// Depths of lines moved by up to `shift`, t being measured from the moved origin; of intervals whose ends are each off
-    /// by up to `blur`.
+    /// by up to `blur`, as are a uniform chord's own.
     Range depth_near(const Real& t0, const Real& t1, const Real& shift, const Real& blur = 0) const;
     /// As depth_part means it: half the chord is less than 2^-5 of its distance.
     bool brief() const { return half_ / w < abs(t_perp) / 31.9; }
@@ -81,7 +81,7 @@ public:
 private:
     const Ellipsoid256& e_;
     Real half_, across_, along_, gradient_;  ///< half chord; greatest whitened length of a unit step across, along the line; slope of `distance`
-    Real depth_at(const Real& d, Real u0, Real u1) const;
+    Real depth_at(const Real& d, Real u0, Real u1, const Real& more = 0) const;  ///< `more`: of the half chord, if its ends matter (uniform)
 };
 
 }  // namespace clume::oracle

@@ -15,7 +15,7 @@ void stress_chords(StressDevice& device, const StressOptions& options, StressRes
 void stress_sums(StressDevice& device, const StressOptions& options, StressResult& result, const PartProgress& progress);      ///< transmittances
 void stress_sampling(StressDevice& device, const StressOptions& options, StressResult& result, const PartProgress& progress);  ///< phase functions, lights, camera
 
-/// The least and the greatest value in `points` per half decade of x.
-void bin_plot(StressPlot& plot);
+/// Leaves one point per half decade of x: what `share` of the values there stay below.
+void bin_plot(StressPlot& plot, double share);
 
 }  // namespace clume

@@ -291,7 +291,7 @@ void stress_lights(StressDevice& device, const StressOptions& options, StressRes
             }
         }
         StressRow row = stress_row("light sampling: direction", "light_sample", f.name, direction_limit, directions, options);
-        row.lost = {lost, cases}, row.invented = {invented, cases};
+        row.lost = {lost, cases, ""}, row.invented = {invented, cases, ""};
         result.rows.push_back(row);
         if (!ends.empty()) result.rows.push_back(stress_row("light sampling: end", "light_sample", f.name, end_limit, ends, options));
         if (!pdfs.empty()) result.rows.push_back(stress_row("light sampling: density", "light_sample", f.name, pdf_limit, pdfs, options));
