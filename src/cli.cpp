@@ -288,7 +288,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     compare->add_option("-o,--output", compare_texts.output, "folder to write; default: the scene's name and _compare")->type_name("FOLDER");
     compare->add_option("--strategies", compare_texts.strategies,
                         "pairs strategy/estimator with commas, such as delta/ratio,march/march; a strategy alone: with every estimator; delta:scene, "
-                        "delta:grid, delta:tree: with that bound; default: all that fit")
+                        "delta:grid, delta:tree: with that bound; default: all")
         ->type_name("LIST");
     compare->add_option("--time", compare_texts.time_s, "equal time: seconds for each pair and seed")->type_name("SECONDS");
     compare->add_option("--spp", compare_texts.spp, "1, 2, 4 ... N samples per pixel, or the counts given with commas; default: render.spp")

@@ -6,13 +6,12 @@
 #include <cmath>
 
 #include "src/alias_table.h"
+#include "src/device_values.h"
 #include "src/error.h"
 #include "src/parallel.h"
 
 namespace clume {
 namespace {
-
-float as_float(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 /// Device groups out of lists of primitives: each list is cut by medium, then into sixteens.
 class GroupWriter {
@@ -78,6 +77,12 @@ void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& elli
         out[i] = {slots[i].threshold, leaf.primitives[i], leaf.primitives[slots[i].other], scale(i) | scale(slots[i].other) << 16};
 }
 
+}  // namespace
+
+device::uint family_bit(KernelFamily k) {
+    return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
+}
+
 void pack_primitives(DeviceScene& out) {
     out.primitives.resize(out.ellipsoids.size());
     parallel_chunks(out.ellipsoids.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -95,18 +100,12 @@ void pack_primitives(DeviceScene& out) {
     });
 }
 
-}  // namespace
-
 void pack_lane(const Ellipsoid& e, std::uint32_t id, float* lane, std::size_t stride) {
     const auto put = [&](int row, float v) { lane[static_cast<std::size_t>(row) * stride] = v; };
     for (int k = 0; k < 3; ++k) put(CLUME_ROW_MU + k, static_cast<float>(e.center[k]));
     for (int k = 0; k < 6; ++k) put(CLUME_ROW_W + k, static_cast<float>(e.w[k]));
     put(CLUME_ROW_SIGMA, static_cast<float>(e.sigma));
     put(CLUME_ROW_ID, as_float(id));
-}
-
-device::uint family_bit(KernelFamily k) {
-    return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
 }
 
 void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out) {
@@ -149,7 +148,7 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
     });
     if (with_references) pack_primitives(out);
     device::RenderParams& p = out.params;
-    p.cells_origin = {static_cast<float>(cells.origin.x), static_cast<float>(cells.origin.y), static_cast<float>(cells.origin.z), static_cast<float>(1.0 / cells.root_size)};
+    p.cells_origin = pack(cells.origin, 1.0 / cells.root_size);
     p.cells_x = cells.roots.x;
     p.cells_y = cells.roots.y;
     p.cells_z = cells.roots.z;

@@ -17,6 +17,9 @@ device::uint family_bit(KernelFamily kernel);
 /// One primitive into its lane of a group: row r goes to lane[r · stride].
 void pack_lane(const Ellipsoid& e, std::uint32_t id, float* lane, std::size_t stride);
 
+/// One by one, in the order of out.ellipsoids.
+void pack_primitives(DeviceScene& out);
+
 /// Cells into the device scene. `with_groups`: for what visits chords or looks densities up by cell; `with_references`: for
 /// null collisions under the cells' bounds. Throws RenderError if there are too many.
 void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out);

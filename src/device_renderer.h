@@ -29,8 +29,12 @@ public:
     /// Batches from now on use `seed` and add to `film`, which must outlive them. Throws DeviceError.
     void aim(FilmSums& film, std::uint64_t seed);
 
-    /// Bounds of `progressive` for the batches from now on, one per leaf; and the highest densities found above them so far.
-    void set_learned(std::span<const float> bounds) { scene_.learned.upload(bounds); }
+    /// Bounds of `progressive` for the batches from the next `aim` on, one per leaf, and whether rays look into every cell that
+    /// they cross; and the highest densities found above the bounds so far.
+    void set_learned(std::span<const float> bounds, bool explore) {
+        scene_.learned.upload(bounds);
+        params_.explore = explore;
+    }
     std::vector<float> raised() const;
 
     std::string name() const override { return queue_.label(); }

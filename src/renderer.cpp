@@ -191,8 +191,8 @@ void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, con
     constexpr double enough = 1e-3;
     constexpr float margin = 1.25f;      // over what was found: the highest density is seldom hit
     constexpr std::uint32_t first_warm_up_sample = 0x80000000u;
-    const auto pass = [&](Accumulation::State& film, std::uint32_t begin, std::uint32_t pass_end) {
-        for (const auto& w : workers) static_cast<DeviceRenderer&>(*w).set_learned(a.learned);
+    const auto pass = [&](Accumulation::State& film, std::uint32_t begin, std::uint32_t pass_end, bool explore) {
+        for (const auto& w : workers) static_cast<DeviceRenderer&>(*w).set_learned(a.learned, explore);
         run_pass(film, begin, pass_end, control);
         for (const auto& w : workers) {
             const std::vector<float> raised = static_cast<DeviceRenderer&>(*w).raised();
@@ -205,7 +205,7 @@ void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, con
         for (int k = 0; k < options.progressive_warm_up; ++k) {
             const std::uint32_t begin = first_warm_up_sample + static_cast<std::uint32_t>(k) * samples;
             Accumulation::State scratch{a.seed, begin, begin, FilmSums(pixels.size(), channels, film_scale), {}};
-            pass(scratch, begin, begin + samples);
+            pass(scratch, begin, begin + samples, true);
             a.render_s += scratch.render_s;
             a.cpu_s += scratch.cpu_s;
             a.interrupted = scratch.interrupted;
@@ -216,7 +216,7 @@ void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, con
     }
     while (a.end < end && !a.stopped()) {
         const std::uint32_t pass_end = std::min(end, a.end + std::max(1u, a.end - a.begin));
-        pass(a, a.end, pass_end);
+        pass(a, a.end, pass_end, false);
         a.end = pass_end;
     }
 }

@@ -15,6 +15,7 @@
 #include "src/doc_report.h"
 #include "src/error.h"
 #include "src/html_page.h"
+#include "src/json_text.h"
 #include "src/output_file.h"
 
 namespace clume {
@@ -196,8 +197,8 @@ void write_stress_json(const fs::path& path, std::span<const StressResult> resul
     out.StartArray();
     for (const StressResult& r : results) {
         out.StartObject();
-        put(out, "device", r.device);
-        put(out, "driver", r.driver);
+        put(out, "device", json_text(r.device));
+        put(out, "driver", json_text(r.driver));
         put(out, "seconds", r.seconds);
         out.Key("holds");
         out.Bool(r.holds());

@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <csignal>
@@ -118,5 +119,40 @@ struct SceneFolder {
     }
     std::size_t files() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), {})); }
 };
+
+/// Runs to the end; an ended process.
+struct Run {
+    int code;
+    std::string out, err;
+    Run(const Words& words, const fs::path& folder) {
+        Process process(words, folder);
+        code = process.wait();
+        out = process.out;
+        err = process.err;
+    }
+};
+
+/// A command line that must fail: its exit code, and what is said on stderr about it.
+struct WrongUse {
+    Words words;
+    int code;
+    const char* says;
+};
+
+/// Checks that each ends as it must, having printed nothing on stdout and left no file that was not there before. One line on
+/// stderr, but for code 4: it lists the devices.
+inline void check_wrong_uses(const fs::path& folder, const std::vector<WrongUse>& uses) {
+    const auto files = [&] { return std::distance(fs::recursive_directory_iterator(folder), {}); };
+    const auto before = files();
+    for (const WrongUse& use : uses) {
+        const Run run(use.words, folder);
+        INFO(Catch::StringMaker<Words>::convert(use.words) << "\n" << run.err);
+        CHECK(run.code == use.code);
+        CHECK(run.out.empty());
+        CHECK_THAT(run.err, Catch::Contains(use.says));
+        if (use.code != 4) CHECK(std::count(run.err.begin(), run.err.end(), '\n') == 1);
+        CHECK(files() == before);
+    }
+}
 
 }  // namespace clume::test
