@@ -31,6 +31,8 @@
 #include "src/save_image.h"
 #include "src/scene_reader.h"
 #include "src/stats_json.h"
+#include "src/stress.h"
+#include "src/stress_report.h"
 #include "src/voxel_grid.h"
 #include "src/voxel_writer.h"
 
@@ -252,6 +254,30 @@ int run(const BakeCommand& command) {
     say("in a scene: " + medium.json);
     for (const std::string& loss : medium.losses) say("warning: " + loss);
     return 0;
+}
+
+int run(const StressCommand& command) {
+    const std::vector<DeviceInfo> devices = select_devices(command.devices);
+    const bool json_on_stdout = command.json && *command.json == "-";
+    if (command.json && !json_on_stdout) check_writable(*command.json);
+    if (command.report) check_stress_report(*command.report);
+    std::vector<StressResult> results;
+    for (const DeviceInfo& device : devices) {
+        PartReporter progress("stressing " + device.label(), command.quiet);
+        results.push_back(run_stress(device, {.quick = command.quick}, [&](double part) { progress.update(part); }));
+        progress.finish();
+        std::fputs(stress_table(results.back()).c_str(), json_on_stdout ? stderr : stdout);
+    }
+    if (command.json) write_stress_json(*command.json, results);
+    if (command.report) std::fputs((write_stress_report(*command.report, results).string() + "\n").c_str(), json_on_stdout ? stderr : stdout);
+    bool holds = true;
+    for (const StressResult& result : results)
+        for (const StressRow& row : result.rows) {
+            if (row.holds()) continue;
+            holds = false;
+            say(fmt::format("{}: {} ({}), {}: {}; at {}", result.device, row.quantity, row.function, row.family, row.trouble(), row.worst_at));
+        }
+    return holds ? 0 : 1;
 }
 
 int run(const PrintCommand& command) {
