@@ -26,6 +26,7 @@
 #include "src/memory_budget.h"
 #include "src/output_file.h"
 #include "src/pilot.h"
+#include "src/printable.h"
 #include "src/progress.h"
 #include "src/renderer.h"
 #include "src/save_image.h"
@@ -40,7 +41,8 @@ namespace {
 
 using namespace clume;
 
-void say(const std::string& text) { std::fputs(("clume: " + text + "\n").c_str(), stderr); }
+/// What it says may quote files.
+void say(const std::string& text) { std::fputs(("clume: " + printable(text, true) + "\n").c_str(), stderr); }
 
 std::string join(const std::vector<std::string>& parts, const char* separator) {
     return fmt::format("{}", fmt::join(parts, separator));
@@ -307,7 +309,7 @@ int outcome(int argc, char** argv) {
         say(in_typed_words(error.what(), arguments));
         return 2;
     } catch (const SceneError& error) {
-        std::fputs((std::string(error.what()) + "\n").c_str(), stderr);  // file:line:column first, as editors want it
+        std::fputs((printable(error.what()) + "\n").c_str(), stderr);  // file:line:column first, as editors want it
         return 3;
     } catch (const DeviceError& error) {
         say(error.what());

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # The tests again and again: what `./clume test` does beside one run of clume_tests.
-#   tests/stages.sh [--all-implementations] [--deep] [ARGS]     ARGS go to the first run's Catch2
+#   tests/stages.sh [--all-implementations] [--fuzz[=SECONDS]] [--deep] [ARGS]     ARGS go to the first run's Catch2
 # --all-implementations  the tests of the kernels on Intel's CPU runtime, then all implementations beside each other
-# --deep                 that, every width, and the checkers: tests/deep.sh
+# --fuzz[=SECONDS]       every reader of files, for 20 s each: tests/fuzz/run.sh
+# --deep                 all that, every width, and the checkers: tests/deep.sh
 # What can't be had (no network, no such package) is skipped, and said in the closing line, which adds up those of all stages.
 set -euo pipefail
 
@@ -34,10 +35,12 @@ skip() {
     skipped+=("$1")
 }
 
-all=0 deep=0 arguments=()
+all=0 deep=0 fuzz=0 arguments=()
 for argument; do
     case $argument in
         --all-implementations) all=1 ;;
+        --fuzz) fuzz=20 ;;
+        --fuzz=*) fuzz=${argument#*=} ;;
         --deep) all=1 deep=1 ;;
         *) arguments+=("$argument") ;;
     esac
@@ -55,6 +58,8 @@ if ((all)); then
     [[ -n $oclgrind ]] || skip 'Oclgrind (not installed)'
     stage 'all implementations beside each other' on_all "$tests" '[implementations]'
 fi
+((deep == 0 || fuzz > 0)) || fuzz=20
+if ((fuzz)); then stage 'fuzzing the readers' "$root/tests/fuzz/run.sh" "$fuzz"; fi
 if ((deep)); then source "$root/tests/deep.sh"; fi
 
 printf '\n%s passed, %s failed' "$passed" "$failed"
