@@ -8,6 +8,7 @@
 #include "src/alias_table.h"
 #include "src/device_values.h"
 #include "src/error.h"
+#include "src/memory_budget.h"
 #include "src/parallel.h"
 
 namespace clume {
@@ -46,11 +47,7 @@ public:
                     for (int r = 0; r < CLUME_GROUP_ROWS; ++r) put(r, pad[r]);
                     continue;
                 }
-                const Ellipsoid& e = ellipsoids_[list[i + lane]];
-                for (int k = 0; k < 3; ++k) put(CLUME_ROW_MU + k, static_cast<float>(e.center[k]));
-                for (int k = 0; k < 6; ++k) put(CLUME_ROW_W + k, static_cast<float>(e.w[k]));
-                put(CLUME_ROW_SIGMA, static_cast<float>(e.sigma));
-                put(CLUME_ROW_ID, as_float(list[i + lane]));
+                pack_lane(ellipsoids_[list[i + lane]], list[i + lane], row + lane, CLUME_GROUP_SIZE);
             }
             i += n;
         }
@@ -104,6 +101,14 @@ void pack_primitives(DeviceScene& out) {
     });
 }
 
+void pack_lane(const Ellipsoid& e, std::uint32_t id, float* lane, std::size_t stride) {
+    const auto put = [&](int row, float v) { lane[static_cast<std::size_t>(row) * stride] = v; };
+    for (int k = 0; k < 3; ++k) put(CLUME_ROW_MU + k, static_cast<float>(e.center[k]));
+    for (int k = 0; k < 6; ++k) put(CLUME_ROW_W + k, static_cast<float>(e.w[k]));
+    put(CLUME_ROW_SIGMA, static_cast<float>(e.sigma));
+    put(CLUME_ROW_ID, as_float(id));
+}
+
 void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out) {
     out.leaves.resize(cells.leaves.size());
     GroupWriter writer(out.ellipsoids, out);
@@ -134,6 +139,7 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
         out.cells[i] = {link, static_cast<float>(cells.leaves[leaf].majorant), first_reference[leaf], static_cast<device::uint>(cells.leaves[leaf].primitives.size())};
     }
     if (std::max(groups, references) > 0x7fffffffu) throw RenderError("the cells need more than 2^31 references");
+    require_memory("cells", {{"groups", 4 * groups * CLUME_GROUP_FLOATS}, {"references", references * sizeof(device::Reference)}});
     writer.extend(groups);
     out.references.resize(references);
     parallel_chunks(cells.leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
