@@ -179,7 +179,7 @@ Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t cou
     return out;
 }
 
-Outputs run_method(const DeviceInfo& device, int width, const Scene& scene, const Pair& pair, std::size_t count) {
+Outputs run_method(const DeviceInfo& device, int width, const Scene& scene, const Pair& pair, std::size_t count, std::uint32_t spp) {
     Outputs out;
     const DeviceScene s = packed(scene, pair);
     const std::string name = pair.name();
@@ -195,8 +195,8 @@ Outputs run_method(const DeviceInfo& device, int width, const Scene& scene, cons
         for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<std::uint32_t>(i);
         keep(out, "probe_camera " + name, probe.camera_rays(pixels, 1));
     }
-    const DeviceImage image = render_device(scene, s, 1, device, width);
-    std::vector<std::uint32_t>& words = out["render " + name];
+    const DeviceImage image = render_device(scene, s, spp, device, width);
+    std::vector<std::uint32_t>& words = out[fmt::format("render {} spp {}", spp, name)];
     for (const FilmSums::Pixel& p : image.values)
         for (const double v : {p.mean[0], p.mean[1], p.mean[2], p.alpha}) {
             const auto b = std::bit_cast<std::uint64_t>(v);

@@ -36,7 +36,7 @@ using Outputs = std::map<std::string, std::vector<std::uint32_t>>;
 
 /// The kernels that need no scene.
 Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t count);
-/// The kernels that do: probe_ray, probe_camera, probe_grid, and the image of one sample per pixel. Only the image if `count` is 0.
-Outputs run_method(const DeviceInfo& device, int width, const Scene& scene, const Pair& pair, std::size_t count);
+/// The kernels that do: probe_ray, probe_camera, probe_grid, and the image of `spp` samples per pixel. Only the image if `count` is 0.
+Outputs run_method(const DeviceInfo& device, int width, const Scene& scene, const Pair& pair, std::size_t count, std::uint32_t spp = 1);
 
 }  // namespace clume::test
