@@ -89,7 +89,7 @@
 #define CLUME_BVH_STACK 256
 #endif
 #ifndef CLUME_LAUNCH_EVENTS  // flights a work-item does before it saves its state for the next launch
-#define CLUME_LAUNCH_EVENTS 65536
+#define CLUME_LAUNCH_EVENTS 4096
 #endif
 #ifndef CLUME_FLIGHT_DRAWS  // tentative collisions a null-collision flight does before it pauses
 #define CLUME_FLIGHT_DRAWS 65536

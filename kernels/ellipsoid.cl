@@ -151,7 +151,7 @@ static vfloat flight_part(const Chord* c, vfloat sigma, vfloat t0, vfloat tau, u
         const vint mirrored = before & (near <= (vfloat)1.0f);
         const vfloat far = vselect(f0 - step, 2.0f - near, before);  // mass ahead of the target
         const vfloat q = vselect(far, near, mirrored);
-        collides &= (q > (vfloat)0x1p-80f) & !dark;
+        collides &= (q > (vfloat)0x1p-80f) & (c->d2 <= (vfloat)138.0f);
         const vfloat x = erfc_inverse_v(vselect((vfloat)1.0f, q, collides));
         t = fma(1.41421356f * vselect(x, -x, mirrored), c->inverse_w, c->t_perp);
         collides &= t <= c->t_out;
@@ -166,7 +166,7 @@ static vfloat flight_part(const Chord* c, vfloat sigma, vfloat t0, vfloat tau, u
         const vfloat s0 = w_over_h * vselect(t0 - c->t_in, c->t_out - t0, later);
         const vfloat g0 = s0 * s0 * fma(s0, (vfloat)(-1.0f / 3.0f), (vfloat)1.0f);
         const vfloat behind = g0 + step;
-        const vint mirrored = !later & (behind <= (vfloat)(2.0f / 3.0f));
+        const vint mirrored = (t0 <= c->t_perp) & (behind <= (vfloat)(2.0f / 3.0f));  // not !later: Oclgrind 21.10 negates vectors of i1 wrongly
         const vfloat ahead = vselect((4.0f / 3.0f) - behind, g0 - step, later);
         const vfloat y = vselect(ahead, behind, mirrored);
         collides &= y > (vfloat)0.0f;
@@ -182,16 +182,18 @@ static vfloat flight_part(const Chord* c, vfloat sigma, vfloat t0, vfloat tau, u
 
 /// Sum of the 16 lanes of a group held in CLUME_PARTS vectors, always by the same pairs: i and i + 8, i + 4, i + 2, i + 1.
 static float reduce_lanes(const vfloat* v) {
+#if CLUME_WIDTH == 4
+    const float4 b = (v[0] + v[2]) + (v[1] + v[3]);
+#else
 #if CLUME_WIDTH == 16
     const float8 a = v[0].lo + v[0].hi;
 #elif CLUME_WIDTH == 8
     const float8 a = v[0] + v[1];
-#elif CLUME_WIDTH == 4
-    const float8 a = (float8)(v[0] + v[2], v[1] + v[3]);
 #else
     const float8 a = (float8)(v[0] + v[8], v[1] + v[9], v[2] + v[10], v[3] + v[11], v[4] + v[12], v[5] + v[13], v[6] + v[14], v[7] + v[15]);
 #endif
     const float4 b = a.lo + a.hi;
+#endif
     const float2 c = b.lo + b.hi;
     return c.x + c.y;
 }

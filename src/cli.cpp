@@ -16,6 +16,7 @@
 
 #include "src/bake.h"
 #include "src/error.h"
+#include "src/memory_budget.h"
 #include "src/scene_schema.h"
 #include "src/voxel_writer.h"
 
@@ -45,13 +46,13 @@ constexpr std::array key_flags{
 constexpr const char* overview =
     "clume renders mixtures of ellipsoids (smoke, fire, clouds) by path tracing, on any OpenCL device.\n";
 constexpr const char* exit_codes =
-    "Exit codes: 0 done, 1 render failed, 2 wrong command line, 3 wrong scene or asset, 4 no such device, 130 interrupted.";
+    "Exit codes: 0 done, 1 render failed, 2 wrong command line, 3 wrong scene or asset, 4 no such device or none left, 130 interrupted.";
 
 /// What the strings of `render` are parsed into before they are checked.
 struct RenderTexts {
-    std::string scene, output, sample_range, crop, stats_json;
+    std::string scene, output, sample_range, crop, stats_json, memory_limit;
     std::vector<std::string> definitions, devices;
-    std::optional<double> time_limit_s;
+    std::optional<double> time_limit_s, kernel_timeout_s;
     std::optional<int> cpu_split;
 };
 
@@ -165,6 +166,8 @@ RenderCommand check_render(RenderTexts texts, RenderCommand command) {
     if (command.stats_json && (*command.stats_json == command.exr || *command.stats_json == command.png()))
         throw UsageError("--stats-json " + texts.stats_json + ": is the name of the image");
 
+    if (!texts.memory_limit.empty()) command.memory_limit = parse_byte_size("--memory-limit", texts.memory_limit);
+
     RenderOptions& options = command.options;
     std::array<std::uint32_t, 2> range{};
     if (!texts.sample_range.empty()) {
@@ -182,6 +185,9 @@ RenderCommand check_render(RenderTexts texts, RenderCommand command) {
     if (texts.time_limit_s && !(*texts.time_limit_s > 0 && std::isfinite(*texts.time_limit_s)))
         throw UsageError("--time-limit: must be a positive number of seconds");
     options.time_limit_s = texts.time_limit_s;
+    if (texts.kernel_timeout_s && !(*texts.kernel_timeout_s >= 0 && *texts.kernel_timeout_s <= 1e6))
+        throw UsageError("--kernel-timeout: must be 0 (never) to 1e6 seconds");
+    options.kernel_timeout_s = texts.kernel_timeout_s.value_or(options.kernel_timeout_s);
     if (texts.cpu_split && *texts.cpu_split < 1) throw UsageError("--cpu-split: must be at least 1");
     options.cpu_split = texts.cpu_split.value_or(0);
     options.devices = texts.devices;
@@ -265,6 +271,10 @@ Command parse_command_line(int argc, const char* const* argv) {
     render->add_option("--sample-range", texts.sample_range, "only samples A to B - 1 of each pixel")->type_name("A:B");
     render->add_option("--crop", texts.crop, "only this part of the film, half-open")->type_name("x0,y0,x1,y1");
     render->add_option("--time-limit", texts.time_limit_s, "stop after this long and write what is done")->type_name("SECONDS");
+    render->add_option("--kernel-timeout", texts.kernel_timeout_s, "a device silent for so long hangs and is given up; default 120; 0: never")
+        ->type_name("SECONDS");
+    render->add_option("--memory-limit", texts.memory_limit, "most memory to use, such as 512M or 2G; default: what is free")
+        ->type_name("SIZE");
     render->add_option("--device", texts.devices, "id, part of a name, cpu, gpu or all; several with commas or repeated")
         ->type_name("DEVICE")
         ->take_all()

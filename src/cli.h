@@ -3,6 +3,7 @@
 // Flags that stand for a scene key become overrides, in the order typed, so that the last one wins whichever way it is said.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -25,6 +26,7 @@ struct RenderCommand {
     double exposure_stops = 0;
     bool explain = false, quiet = false;
     std::optional<std::filesystem::path> stats_json;  ///< "-": stdout
+    std::optional<std::uint64_t> memory_limit;        ///< bytes
 
     std::filesystem::path png() const { return std::filesystem::path(exr).replace_extension(".png"); }
 };

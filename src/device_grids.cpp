@@ -9,6 +9,7 @@
 #include "src/cells.h"
 #include "src/device_values.h"
 #include "src/error.h"
+#include "src/memory_budget.h"
 #include "src/parallel.h"
 
 namespace clume {
@@ -284,6 +285,7 @@ void add_grid(const Layout& l, std::uint32_t levels, int bounds, DeviceScene& ou
     info.first_brick = static_cast<device::uint>(first_value / GRID_BRICK_VALUES);
     info.first_entry = static_cast<device::uint>(first_entry);
     if (first_value / GRID_BRICK_VALUES + l.stored.size() > 0x7fffff00u) throw SceneError("voxel grids of more than 2^31 bricks");
+    require_memory("voxel grid", {{"values on the host", 4 * (first_value + GRID_BRICK_VALUES * l.stored.size())}});
     out.grid_values.resize(first_value + GRID_BRICK_VALUES * l.stored.size());
     const std::vector<std::uint32_t> table = make_table(l, roots, levels);
     out.grid_cells.resize(first_entry + table.size());

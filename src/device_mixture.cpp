@@ -8,6 +8,7 @@
 #include "src/alias_table.h"
 #include "src/device_values.h"
 #include "src/error.h"
+#include "src/memory_budget.h"
 #include "src/parallel.h"
 
 namespace clume {
@@ -138,6 +139,7 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
         out.cells[i] = {link, static_cast<float>(cells.leaves[leaf].majorant), first_reference[leaf], static_cast<device::uint>(cells.leaves[leaf].primitives.size())};
     }
     if (std::max(groups, references) > 0x7fffffffu) throw RenderError("the cells need more than 2^31 references");
+    require_memory("cells", {{"groups", 4 * groups * CLUME_GROUP_FLOATS}, {"references", references * sizeof(device::Reference)}});
     writer.extend(groups);
     out.references.resize(references);
     parallel_chunks(cells.leaves.size(), 256, [&](std::size_t begin, std::size_t end) {

@@ -15,6 +15,7 @@
 #include "src/device_mixture.h"
 #include "src/device_values.h"
 #include "src/error.h"
+#include "src/memory_budget.h"
 #include "src/strategies.h"
 
 namespace clume {
@@ -251,6 +252,9 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     const Structures wanted = with_structures ? structures_of(out, lights.nee != 0, options) : Structures{};
 
     const auto start = std::chrono::steady_clock::now();
+    std::uint64_t primitives = 0;
+    for (const auto& m : scene.media) primitives += m.primitives.size();
+    require_memory(scene.path, {{"primitives for the device", primitives * (sizeof(Ellipsoid) + sizeof(device::Primitive))}, {"tree over them", primitives * 2 * sizeof(BvhTree::Node)}});
     out.ellipsoids = make_ellipsoids(scene, out.normalization);
     const Box bounds = bounds_of(out.ellipsoids);
     out.params.bounds_min = pack(bounds.lo);
