@@ -103,7 +103,12 @@ fs::path Report::plot(const std::string& name, const Plot& plot) const {
 std::string Report::markdown(const Table& rows) {
     std::string text;
     for (std::size_t i = 0; i < rows.size(); ++i) {
-        text += fmt::format("| {} |\n", fmt::join(rows[i], " | "));
+        text += "|";
+        for (std::string cell : rows[i]) {
+            for (std::size_t at = 0; (at = cell.find('|', at)) != std::string::npos; at += 2) cell.insert(at, 1, '\\');
+            text += " " + cell + " |";
+        }
+        text += "\n";
         if (i > 0) continue;
         text += "|";
         for (std::size_t k = 0; k < rows[0].size(); ++k) text += "---|";
