@@ -83,6 +83,9 @@ EnvironmentImage read_exr(const std::string& name, std::string_view bytes) {
     const auto side = [](int low, int high) { return static_cast<std::int64_t>(high) - low + 1; };
     EnvironmentImage image = sized_image(name, side(display.min.x, display.max.x), side(display.min.y, display.max.y), bytes.size());
     EnvironmentImage stored = sized_image(name, side(data.min.x, data.max.x), side(data.min.y, data.max.y), bytes.size());
+    const auto texels = [](const EnvironmentImage& of) { return static_cast<double>(of.width) * of.height; };
+    // Where the windows differ, both are held for a while.
+    if (data != display) check_memory(name, image_memory, (texels(image) + texels(stored)) * 3 * sizeof(float), bytes.size());
     stored.rgb.resize(static_cast<std::size_t>(stored.width) * static_cast<std::size_t>(stored.height) * 3);
 
     const std::size_t x_stride = 3 * sizeof(float), y_stride = x_stride * static_cast<std::size_t>(stored.width);

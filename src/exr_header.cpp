@@ -110,10 +110,16 @@ class PartChecker {
         const bool tiled = names_.count("tiles") != 0;
         const auto chunks = [](std::int64_t all, std::int64_t one) { return (all + one - 1) / one; };
         check_table(tiled ? chunks(width_, tile_width_) * chunks(height_, tile_height_) : chunks(height_, most_chunk_lines));
-        // What the library keeps of the pixels is one chunk, but it unpacks them all.
-        const double texels = tiled ? static_cast<double>(std::max(width_, tile_width_)) * static_cast<double>(std::max(height_, tile_height_))
-                                    : static_cast<double>(width_) * static_cast<double>(height_);
-        check_memory(in_.name(), image_memory, texels * static_cast<double>(pixel_bytes_), bytes_.size());
+        // The library unpacks all pixels, one chunk at a time, of which it and its decoders keep up to four copies.
+        const auto check_texels = [&](std::int64_t width, std::int64_t height, double copies) {
+            check_memory(in_.name(), image_memory, copies * static_cast<double>(width) * static_cast<double>(height) * static_cast<double>(pixel_bytes_),
+                         bytes_.size());
+        };
+        check_texels(width_, height_, 1);
+        if (tiled)
+            check_texels(tile_width_, tile_height_, 4);
+        else
+            check_texels(width_, std::min(height_, most_chunk_lines), 4);
     }
 
     ByteReader& in_;
