@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -51,7 +52,9 @@ inline DeviceImage render_device(const Scene& scene, const DeviceScene& device, 
     DeviceRenderer renderer(info, device, image.pixels, tiles, width);
     renderer.aim(film, scene.render.seed);
     renderer.run({0, 0, spp});
+    renderer.commit({0, 0, spp});
     for (std::size_t i = 0; i < image.pixels.size(); ++i) image.values.push_back(film.pixel(i));
+    if (!image.values.empty() && image.values[0].samples != spp) throw std::logic_error("an image without its samples proves nothing");
     image.nonfinite = film.nonfinite();
     image.violations = film.violations();
     return image;
