@@ -343,6 +343,19 @@ Command parse_command_line(int argc, const char* const* argv) {
                                        ->take_all()
                                        ->allow_extra_args(false);
     bake->add_flag("--quiet", bake_quiet, "no progress on stderr");
+    StressCommand stress_command;
+    std::string stress_json, stress_report;
+    CLI::App* stress = app.add_subcommand("stress", "hold the kernels' arithmetic against 256 bits; prints a table")->allow_extras();
+    stress->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    stress->add_option("--device", stress_command.devices, "id, part of a name, cpu, gpu or all; several with commas or repeated")
+        ->type_name("DEVICE")
+        ->take_all()
+        ->allow_extra_args(false);
+    stress->add_flag("--quick", stress_command.quick, "fewer cases: seconds");
+    stress->add_option("--json", stress_json, "write every figure; - is stdout (the table then goes to stderr)")->type_name("FILE");
+    stress->add_option("--report", stress_report, "write a page with plots into this folder; where it holds stability.md, remake that page's tables and plots")
+        ->type_name("DIR");
+    stress->add_flag("--quiet", stress_command.quiet, "no progress on stderr");
     app.add_subcommand("bench", "measure speed; see clume bench --help");
 
     try {
@@ -357,7 +370,7 @@ Command parse_command_line(int argc, const char* const* argv) {
         throw UsageError(text);
     }
     refuse_leftovers(app, nullptr);
-    for (const CLI::App* sub : {render, compare, devices, info, bake})
+    for (const CLI::App* sub : {render, compare, devices, info, bake, stress})
         if (sub->parsed()) refuse_leftovers(*sub, &app);
     if (app.get_subcommands().size() > 1) throw UsageError("one subcommand at a time");
 
@@ -382,7 +395,12 @@ Command parse_command_line(int argc, const char* const* argv) {
         out.quiet = bake_quiet;
         return out;
     }
-    throw UsageError("which subcommand? render, compare, devices, info, bake or bench; see clume --help");
+    if (stress->parsed()) {
+        if (!stress_json.empty()) stress_command.json = stress_json;
+        if (!stress_report.empty()) stress_command.report = stress_report;
+        return stress_command;
+    }
+    throw UsageError("which subcommand? render, compare, devices, info, bake, stress or bench; see clume --help");
 }
 
 }  // namespace clume

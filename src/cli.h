@@ -54,12 +54,20 @@ struct BakeCommand {
     bool quiet = false;
 };
 
+struct StressCommand {
+    std::vector<std::string> devices;
+    bool quick = false;
+    std::optional<std::filesystem::path> json;    ///< "-": stdout
+    std::optional<std::filesystem::path> report;  ///< folder
+    bool quiet = false;
+};
+
 /// --help and --version: `text` goes to stdout.
 struct PrintCommand {
     std::string text;
 };
 
-using Command = std::variant<PrintCommand, RenderCommand, CompareCommand, DevicesCommand, InfoCommand, BakeCommand>;
+using Command = std::variant<PrintCommand, RenderCommand, CompareCommand, DevicesCommand, InfoCommand, BakeCommand, StressCommand>;
 
 /// Throws UsageError with one line that names the nearest right flag or subcommand. `bench` is the caller's: its arguments
 /// are not parsed here.

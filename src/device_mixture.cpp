@@ -48,11 +48,7 @@ public:
                     for (int r = 0; r < CLUME_GROUP_ROWS; ++r) put(r, pad[r]);
                     continue;
                 }
-                const Ellipsoid& e = ellipsoids_[list[i + lane]];
-                for (int k = 0; k < 3; ++k) put(CLUME_ROW_MU + k, static_cast<float>(e.center[k]));
-                for (int k = 0; k < 6; ++k) put(CLUME_ROW_W + k, static_cast<float>(e.w[k]));
-                put(CLUME_ROW_SIGMA, static_cast<float>(e.sigma));
-                put(CLUME_ROW_ID, as_float(list[i + lane]));
+                pack_lane(ellipsoids_[list[i + lane]], list[i + lane], row + lane, CLUME_GROUP_SIZE);
             }
             i += n;
         }
@@ -104,6 +100,14 @@ void pack_primitives(DeviceScene& out) {
             p.medium = e.medium;
         }
     });
+}
+
+void pack_lane(const Ellipsoid& e, std::uint32_t id, float* lane, std::size_t stride) {
+    const auto put = [&](int row, float v) { lane[static_cast<std::size_t>(row) * stride] = v; };
+    for (int k = 0; k < 3; ++k) put(CLUME_ROW_MU + k, static_cast<float>(e.center[k]));
+    for (int k = 0; k < 6; ++k) put(CLUME_ROW_W + k, static_cast<float>(e.w[k]));
+    put(CLUME_ROW_SIGMA, static_cast<float>(e.sigma));
+    put(CLUME_ROW_ID, as_float(id));
 }
 
 void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out) {

@@ -63,6 +63,7 @@ void DeviceRenderer::aim(FilmSums& film, std::uint64_t seed) {
 
 void DeviceRenderer::set_learned(std::span<const float> bounds, bool explore) {
     learned_.assign(bounds.begin(), bounds.end());
+    raised_.assign(bounds.size(), 0.0f);
     params_.explore = explore;
     aimed_ = false;
 }
@@ -70,7 +71,9 @@ void DeviceRenderer::set_learned(std::span<const float> bounds, bool explore) {
 void DeviceRenderer::upload_changes() {
     if (!aimed_) scene_.params.upload(std::span(&params_, 1));
     aimed_ = true;
-    if (!learned_.empty()) scene_.learned.upload(learned_);
+    if (learned_.empty()) return;
+    scene_.learned.upload(learned_);
+    scene_.raised.upload(std::vector<device::uint>(learned_.size()));
     learned_.clear();
 }
 

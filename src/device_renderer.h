@@ -34,7 +34,7 @@ public:
     void aim(FilmSums& film, std::uint64_t seed);
 
     /// Bounds of `progressive` for the batches from now on, one per leaf, and whether rays look into every cell that they cross;
-    /// and the highest densities that batches so far have found above the bounds.
+    /// and the highest densities that batches have found above those bounds since.
     void set_learned(std::span<const float> bounds, bool explore);
     std::span<const float> raised() const { return raised_; }
 

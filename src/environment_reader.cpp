@@ -18,26 +18,27 @@
 #include <string_view>
 
 #include "src/error.h"
+#include "src/exr_header.h"
 #include "src/input_file.h"
 #include "src/json_reader.h"
+#include "src/memory_bound.h"
 
 namespace clume {
 
 namespace {
 
-constexpr int largest_side = 65536;
-
 [[noreturn]] void fail(const std::string& name, const std::string& why) { throw SceneError(fmt::format("{}: {}", name, why)); }
 
 /// An image of that size, checked but without its texels.
-EnvironmentImage sized_image(const std::string& name, std::int64_t width, std::int64_t height) {
-    if (width < 1 || height < 1 || width > largest_side || height > largest_side)
-        fail(name, fmt::format("an image of {} x {} texels; each side must be in [1,{}]", width, height, largest_side));
+EnvironmentImage sized_image(const std::string& name, std::int64_t width, std::int64_t height, std::uint64_t file_bytes) {
+    if (width < 1 || height < 1 || width > largest_image_side || height > largest_image_side)
+        fail(name, fmt::format("an image of {} x {} texels; each side must be in [1,{}]", width, height, largest_image_side));
     // The file and the tables that follow from the image need room as well.
     const std::uint64_t byte_size = static_cast<std::uint64_t>(width * height) * 3 * sizeof(float);
     if (byte_size > physical_memory_bytes() / 2)
         fail(name, fmt::format("an image of {} x {} texels needs {:.1f} GB; this machine has {:.1f}", width, height,
                                static_cast<double>(byte_size) * 2e-9, static_cast<double>(physical_memory_bytes()) * 1e-9));
+    check_memory(name, image_memory, static_cast<double>(byte_size), file_bytes);
     EnvironmentImage image;
     image.width = static_cast<int>(width);
     image.height = static_cast<int>(height);
@@ -63,7 +64,7 @@ class MemoryStream : public Imf::IStream {
 
 EnvironmentImage read_exr(const std::string& name, std::string_view bytes) {
     // What a header may ask for, before the library allocates by it.
-    Imf::Header::setMaxImageSize(largest_side, largest_side);
+    check_exr_headers(name, bytes);
     MemoryStream stream(name, bytes);
     Imf::InputFile file(stream);
     const Imf::Header& header = file.header();
@@ -80,8 +81,11 @@ EnvironmentImage read_exr(const std::string& name, std::string_view bytes) {
             fail(name, fmt::format("channel {} is subsampled", channel));
 
     const auto side = [](int low, int high) { return static_cast<std::int64_t>(high) - low + 1; };
-    EnvironmentImage image = sized_image(name, side(display.min.x, display.max.x), side(display.min.y, display.max.y));
-    EnvironmentImage stored = sized_image(name, side(data.min.x, data.max.x), side(data.min.y, data.max.y));
+    EnvironmentImage image = sized_image(name, side(display.min.x, display.max.x), side(display.min.y, display.max.y), bytes.size());
+    EnvironmentImage stored = sized_image(name, side(data.min.x, data.max.x), side(data.min.y, data.max.y), bytes.size());
+    const auto texels = [](const EnvironmentImage& of) { return static_cast<double>(of.width) * of.height; };
+    // Where the windows differ, both are held for a while.
+    if (data != display) check_memory(name, image_memory, (texels(image) + texels(stored)) * 3 * sizeof(float), bytes.size());
     stored.rgb.resize(static_cast<std::size_t>(stored.width) * static_cast<std::size_t>(stored.height) * 3);
 
     const std::size_t x_stride = 3 * sizeof(float), y_stride = x_stride * static_cast<std::size_t>(stored.width);
@@ -144,7 +148,7 @@ class HdrReader {
         if (words.size() > 64 || std::sscanf(words.c_str(), "-Y %9d +X %9d%n", &height, &width, &used) != 2 ||
             static_cast<std::size_t>(used) != words.size())
             fail(name_, fmt::format("unknown HDR orientation or size {}; known: -Y height +X width", in_quotes(size)));
-        EnvironmentImage image = sized_image(name_, width, height);
+        EnvironmentImage image = sized_image(name_, width, height, bytes_.size());
         std::vector<unsigned char> texels(static_cast<std::size_t>(width) * 4);
         for (int y = 0; y < height; ++y) {
             scan_line(texels);

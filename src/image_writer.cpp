@@ -19,6 +19,8 @@
 #include <string_view>
 
 #include "src/error.h"
+#include "src/exr_header.h"
+#include "src/input_file.h"
 
 namespace clume {
 
@@ -111,6 +113,7 @@ void write_exr(const std::filesystem::path& path, const RenderImage& image, cons
 
 RenderImage read_exr(const std::filesystem::path& path, ImageMetadata* metadata, bool colour_suffices) {
     try {
+        check_exr_headers(path.string(), read_file_bytes(path));  // before the library allocates by them
         Imf::InputFile exr(path.c_str());
         const Imf::Header& header = exr.header();
         const Imath::Box2i data = header.dataWindow(), display = header.displayWindow();
@@ -138,6 +141,8 @@ RenderImage read_exr(const std::filesystem::path& path, ImageMetadata* metadata,
         return image;
     } catch (const std::bad_alloc&) {
         throw;
+    } catch (const SceneError& error) {
+        throw RenderError(path.string() + ": cannot be read" + (error.what() + path.string().size()));
     } catch (const std::exception& error) {
         throw RenderError(path.string() + ": cannot be read: " + error.what());
     }

@@ -9,6 +9,7 @@
 #include "src/device_scene.h"
 #include "src/error.h"
 #include "src/json_reader.h"
+#include "src/printable.h"
 #include "src/renderer.h"
 #include "src/voxel_file.h"
 #include "src/voxel_info.h"
@@ -85,7 +86,7 @@ void print_info(const std::filesystem::path& file, std::span<const Override> ove
     fmt::print("  film            {} x {}, {} spp, seed {}\n", scene.film.width, scene.film.height, scene.render.spp, scene.render.seed);
     for (std::size_t m = 0; m < scene.media.size(); ++m) {
         const auto& medium = scene.media[m];
-        fmt::print("  medium {}        {}: {}, extent {:g}, density_scale {:g}\n", m, medium.source, name_of(medium.kernel), medium.extent, medium.density_scale);
+        fmt::print("  medium {}        {}: {}, extent {:g}, density_scale {:g}\n", m, printable(medium.source), name_of(medium.kernel), medium.extent, medium.density_scale);
         fmt::print("    primitives    {} ({} dropped: no density)\n", medium.primitives.size(), medium.dropped);
         if (medium.primitives.empty()) continue;
         glm::dvec3 lo(1e300), hi(-1e300);

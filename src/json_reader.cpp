@@ -16,6 +16,7 @@
 #include <numeric>
 
 #include "src/error.h"
+#include "src/printable.h"
 
 namespace clume {
 
@@ -60,20 +61,10 @@ std::string json_string(std::string_view text) {
 
 std::string in_quotes(std::string_view text) {
     constexpr std::size_t most = 80;
-    std::string out = "\"";
-    std::size_t used = 0;
-    for (const char c : text) {
-        // Cut between characters, never inside one.
-        if (++used > most && (static_cast<unsigned char>(c) & 0xC0) != 0x80) {
-            out += "...";
-            break;
-        }
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F)
-            out += fmt::format("\\x{:02x}", static_cast<unsigned>(c));
-        else
-            out += c;
-    }
-    return out + '"';
+    std::size_t end = std::min(most, text.size());
+    // Cut between characters, never inside one.
+    while (end < text.size() && end < most + 3 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) ++end;
+    return '"' + printable(text.substr(0, end)) + (end < text.size() ? "..." : "") + '"';
 }
 
 namespace {

@@ -26,11 +26,14 @@
 #include "src/memory_budget.h"
 #include "src/output_file.h"
 #include "src/pilot.h"
+#include "src/printable.h"
 #include "src/progress.h"
 #include "src/renderer.h"
 #include "src/save_image.h"
 #include "src/scene_reader.h"
 #include "src/stats_json.h"
+#include "src/stress.h"
+#include "src/stress_report.h"
 #include "src/voxel_grid.h"
 #include "src/voxel_writer.h"
 
@@ -38,7 +41,8 @@ namespace {
 
 using namespace clume;
 
-void say(const std::string& text) { std::fputs(("clume: " + text + "\n").c_str(), stderr); }
+/// What it says may quote files.
+void say(const std::string& text) { std::fputs(("clume: " + printable(text, true) + "\n").c_str(), stderr); }
 
 std::string join(const std::vector<std::string>& parts, const char* separator) {
     return fmt::format("{}", fmt::join(parts, separator));
@@ -254,6 +258,30 @@ int run(const BakeCommand& command) {
     return 0;
 }
 
+int run(const StressCommand& command) {
+    const std::vector<DeviceInfo> devices = select_devices(command.devices);
+    const bool json_on_stdout = command.json && *command.json == "-";
+    if (command.json && !json_on_stdout) check_writable(*command.json);
+    if (command.report) check_stress_report(*command.report);
+    std::vector<StressResult> results;
+    for (const DeviceInfo& device : devices) {
+        PartReporter progress("stressing " + device.label(), command.quiet);
+        results.push_back(run_stress(device, {.quick = command.quick}, [&](double part) { progress.update(part); }));
+        progress.finish();
+        std::fputs(stress_table(results.back()).c_str(), json_on_stdout ? stderr : stdout);
+    }
+    if (command.json) write_stress_json(*command.json, results);
+    if (command.report) std::fputs((write_stress_report(*command.report, results).string() + "\n").c_str(), json_on_stdout ? stderr : stdout);
+    bool holds = true;
+    for (const StressResult& result : results)
+        for (const StressRow& row : result.rows) {
+            if (row.holds()) continue;
+            holds = false;
+            say(fmt::format("{}: {} ({}), {}: {}; at {}", result.device, row.quantity, row.function, row.family, row.trouble(), row.worst_at));
+        }
+    return holds ? 0 : 1;
+}
+
 int run(const PrintCommand& command) {
     std::fputs(command.text.c_str(), stdout);
     return 0;
@@ -281,7 +309,7 @@ int outcome(int argc, char** argv) {
         say(in_typed_words(error.what(), arguments));
         return 2;
     } catch (const SceneError& error) {
-        std::fputs((std::string(error.what()) + "\n").c_str(), stderr);  // file:line:column first, as editors want it
+        std::fputs((printable(error.what()) + "\n").c_str(), stderr);  // file:line:column first, as editors want it
         return 3;
     } catch (const DeviceError& error) {
         say(error.what());

@@ -51,7 +51,7 @@ class GridBytes {
     GridBytes(const std::string& name, std::uint64_t byte_size)
         : name_(name), chunks_((byte_size + sizeof(Chunk) - 1) / sizeof(Chunk)), size_(byte_size) {}
 
-    char* data() { return chunks_.data()->bytes; }
+    char* data() { return reinterpret_cast<char*>(chunks_.data()); }
     std::uint64_t size() const { return size_; }
     [[noreturn]] void fail(const std::string& why) const { throw SceneError(fmt::format("{}: corrupt: {}", name_, why)); }
 
@@ -61,7 +61,7 @@ class GridBytes {
         at = from + static_cast<std::uint64_t>(offset);
         if (at % NANOVDB_DATA_ALIGNMENT != 0 || at > size_ || byte_size > size_ - at)
             fail(fmt::format("a node is to be at byte {} + {} of a grid of {} bytes", from, offset, size_));
-        return *reinterpret_cast<const Node*>(chunks_.data()->bytes + at);
+        return *reinterpret_cast<const Node*>(reinterpret_cast<const char*>(chunks_.data()) + at);
     }
 
   private:
@@ -79,7 +79,8 @@ class TreeReader {
     using Leaf = typename nanovdb::NanoLeaf<Build>::DataType;
 
   public:
-    TreeReader(const std::string& name, const GridBytes& bytes) : name_(name), bytes_(bytes) {}
+    TreeReader(const std::string& name, const GridBytes& bytes, std::uint64_t file_bytes)
+        : name_(name), bytes_(bytes), file_bytes_(file_bytes) {}
 
     VoxelGrid run() {
         std::uint64_t at = 0, root_at = 0;
@@ -92,7 +93,7 @@ class TreeReader {
         const std::uint64_t table_bytes = std::uint64_t{root.mTableSize} * sizeof(Tile);
         std::uint64_t table_at = 0;
         const Tile* tiles = &bytes_.template node<Tile>(root_at, sizeof(Root), table_bytes, table_at);
-        BrickSet bricks(name_, static_cast<double>(root.mBackground));
+        BrickSet bricks(name_, static_cast<double>(root.mBackground), file_bytes_);
         for (std::uint32_t i = 0; i < root.mTableSize; ++i) {
             const Tile& tile = tiles[i];
             const glm::ivec3 origin = origin_of(tile.key);
@@ -167,6 +168,7 @@ class TreeReader {
 
     const std::string& name_;
     const GridBytes& bytes_;
+    std::uint64_t file_bytes_;
     std::vector<std::uint64_t> leaves_;
     std::uint64_t visited_bytes_ = 0;
 };
@@ -286,17 +288,17 @@ class NvdbFile : public VoxelFile {
     VoxelGrid read_tree(const GridBytes& grid, nanovdb::GridType type) const {
         switch (type) {
             case nanovdb::GridType::Double:
-                return TreeReader<double>(name_, grid).run();
+                return TreeReader<double>(name_, grid, bytes_.size()).run();
             case nanovdb::GridType::Fp4:
-                return TreeReader<nanovdb::Fp4>(name_, grid).run();
+                return TreeReader<nanovdb::Fp4>(name_, grid, bytes_.size()).run();
             case nanovdb::GridType::Fp8:
-                return TreeReader<nanovdb::Fp8>(name_, grid).run();
+                return TreeReader<nanovdb::Fp8>(name_, grid, bytes_.size()).run();
             case nanovdb::GridType::Fp16:
-                return TreeReader<nanovdb::Fp16>(name_, grid).run();
+                return TreeReader<nanovdb::Fp16>(name_, grid, bytes_.size()).run();
             case nanovdb::GridType::FpN:
-                return TreeReader<nanovdb::FpN>(name_, grid).run();
+                return TreeReader<nanovdb::FpN>(name_, grid, bytes_.size()).run();
             default:
-                return TreeReader<float>(name_, grid).run();
+                return TreeReader<float>(name_, grid, bytes_.size()).run();
         }
     }
 

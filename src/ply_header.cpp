@@ -82,6 +82,8 @@ class HeaderReader {
                 const auto read = std::from_chars(words[2].data(), end, element.count);
                 if (read.ec != std::errc() || read.ptr != end)
                     fail(fmt::format("element count {} is not a number of elements", in_quotes(words[2])));
+                // Few enough that comparing each with each takes no time.
+                if (header_.elements.size() >= most_names) fail(fmt::format("more than {} elements", most_names));
                 for (const Element& other : header_.elements)
                     if (other.name == element.name) fail(fmt::format("element {} stands twice", in_quotes(element.name)));
                 header_.elements.push_back(std::move(element));
@@ -105,7 +107,7 @@ class HeaderReader {
         const auto count_type = property.is_list ? scalar_named(words[2]) : Scalar::u8;
         if (!type || !count_type || *count_type >= Scalar::f32)
             fail(fmt::format("unknown type in property {}", in_quotes(property.name)));
-        if (element.properties.size() >= 4096) fail("more than 4096 properties");
+        if (++properties_ > most_names) fail(fmt::format("more than {} properties", most_names));
         for (const Property& other : element.properties)
             if (other.name == property.name) fail(fmt::format("property {} stands twice", in_quotes(property.name)));
         property.type = *type;
@@ -132,9 +134,12 @@ class HeaderReader {
         return true;
     }
 
+    static constexpr std::size_t most_names = 4096;
+
     std::string_view bytes_;
     const std::string& name_;
     Header header_;
+    std::size_t properties_ = 0;  ///< of all elements
 };
 
 }  // namespace

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Ellipsoids from PLY files, by property name: ascii and binary of either byte order, every scalar type. Other elements,
 // lists and unused properties are skipped without being kept. Reads the encodings of Mitsuba's ellipsoids and of 3DGS
-// captures. The counts in the header are checked against the file's size before anything is allocated by them.
+// captures. The counts in the header are checked against the file's size before anything is allocated by them; what is held
+// stays within `ply_memory` (memory_bound.h).
 #pragma once
 
 #include <cstddef>

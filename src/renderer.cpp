@@ -2,6 +2,7 @@
 #include "src/renderer.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <ctime>
 #include <fmt/format.h>
@@ -132,6 +133,7 @@ struct Accumulation::State {
     double render_s = 0, cpu_s = 0;
     bool interrupted = false, time_limited = false, device_lost = false;
     std::vector<float> learned{};  ///< bounds of `progressive`; empty before the first pass
+    std::vector<float> raised{};   ///< the highest densities found above them by any device
 
     bool stopped() const { return interrupted || time_limited || device_lost; }
 };
@@ -154,7 +156,6 @@ struct Renderer::Impl {
     RenderStats setup;
     std::vector<device::uint> pixels;
     std::vector<Tile> tiles;
-    std::vector<float> raised;                     ///< of `progressive`: the highest densities found by any device in the passes so far
     int channels = 3;
     double film_scale = 1;
     std::vector<float> first_bounds;               ///< of `progressive`; empty for other strategies
@@ -226,7 +227,7 @@ void Renderer::Impl::run_pass(Accumulation::State& a, std::uint32_t begin, std::
         const auto& renderer = static_cast<const DeviceRenderer&>(*workers[k]);
         if (const std::size_t items = renderer.short_of_memory(); items > 0 && told_short_of_memory.insert(w.name).second)
             setup.warnings.push_back(fmt::format("device {} is short of memory: batches of at most {} paths at a time", w.name, items));
-        for (std::size_t i = 0; i < raised.size(); ++i) raised[i] = std::max(raised[i], renderer.raised()[i]);
+        for (std::size_t i = 0; i < a.raised.size(); ++i) a.raised[i] = std::max(a.raised[i], renderer.raised()[i]);
         if (w.hung) note_hang(w.name);
         if (w.dropped) workers.erase(workers.begin() + static_cast<std::ptrdiff_t>(k));
     }
@@ -239,17 +240,21 @@ void Renderer::Impl::run_pass(Accumulation::State& a, std::uint32_t begin, std::
 
 // A first look at how high the density goes: passes that the image does not hold, until little exceeds its bound.
 // Then passes that double, each under what all before it have found, so that the share of the image made under low bounds
-// vanishes. Everything is a function of seed and sample numbers, and so are the bounds.
+// vanishes. Everything is a function of seed and sample numbers, and so are the bounds: a pass that ends early goes on under
+// the same ones the next time.
 void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, const RunControl& control) {
     // Optical depth left out, of the bounds'. Not the share of look-ups above their bound: where bounds are far too low there
     // are hardly any look-ups, and those that are stand for much.
     constexpr double enough = 1e-3;
     constexpr float margin = 1.25f;      // over what was found: the highest density is seldom hit
     constexpr std::uint32_t first_warm_up_sample = 0x80000000u;
-    const auto pass = [&](Accumulation::State& film, std::uint32_t begin, std::uint32_t pass_end, bool explore) {
+    const auto run = [&](Accumulation::State& film, std::uint32_t begin, std::uint32_t pass_end, bool explore) {
+        film.raised.resize(first_bounds.size());
         for (const auto& w : workers) static_cast<DeviceRenderer&>(*w).set_learned(a.learned, explore);
         run_pass(film, begin, pass_end, control);
-        for (std::size_t i = 0; i < a.learned.size(); ++i) a.learned[i] = std::max(a.learned[i], margin * raised[i]);
+    };
+    const auto learn = [&](const Accumulation::State& film) {
+        for (std::size_t i = 0; i < a.learned.size(); ++i) a.learned[i] = std::max(a.learned[i], margin * film.raised[i]);
     };
     if (a.learned.empty()) {
         a.learned = first_bounds;
@@ -257,7 +262,8 @@ void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, con
         for (int k = 0; k < options.progressive_warm_up; ++k) {
             const std::uint32_t begin = first_warm_up_sample + static_cast<std::uint32_t>(k) * samples;
             Accumulation::State scratch{a.seed, begin, begin, FilmSums(pixels.size(), channels, film_scale), {}};
-            pass(scratch, begin, begin + samples, true);
+            run(scratch, begin, begin + samples, true);
+            learn(scratch);
             a.render_s += scratch.render_s;
             a.cpu_s += scratch.cpu_s;
             a.interrupted = scratch.interrupted;
@@ -267,9 +273,12 @@ void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, con
         }
     }
     while (a.end < end && !a.stopped()) {
-        const std::uint32_t pass_end = std::min(end, a.end + std::max(1u, a.end - a.begin));
-        pass(a, a.end, pass_end, false);
-        a.end = pass_end;
+        const std::uint32_t done = a.end - a.begin;
+        const std::uint64_t pass_end = std::uint64_t{a.begin} + (done == 0 ? 1 : 2 * std::uint64_t{std::bit_floor(done)});
+        const auto stop = static_cast<std::uint32_t>(std::min<std::uint64_t>(end, pass_end));
+        run(a, a.end, stop, false);
+        a.end = stop;
+        if (stop == pass_end) learn(a);
     }
 }
 
@@ -317,7 +326,6 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     impl_->film_scale = static_cast<double>(device.params.film_scale);
     impl_->first_bounds = device.learned;
     for (float& bound : impl_->first_bounds) bound *= static_cast<float>(o.progressive_start);
-    impl_->raised.assign(device.learned.size(), 0.0f);
     impl_->make_workers(devices, packed);
 }
 

@@ -212,6 +212,22 @@ Light read_light(const SectionReader& section, const Path& folder) {
     return light;
 }
 
+/// What the files that a scene names hold in memory together; a scene can name one file a thousand times.
+class AssetMemory {
+  public:
+    explicit AssetMemory(const SceneSource& source) : source_(source) {}
+    void add(const JsonPosition& at, std::uint64_t byte_size) {
+        held_ += byte_size;
+        if (held_ > physical_memory_bytes() / 2)
+            source_.fail_asset(at, fmt::format("the files up to here hold {:.1f} GB, and half of this machine's memory is {:.1f}",
+                                               static_cast<double>(held_) * 1e-9, static_cast<double>(physical_memory_bytes()) * 0.5e-9));
+    }
+
+  private:
+    const SceneSource& source_;
+    std::uint64_t held_ = 0;
+};
+
 /// Whether any (1 − albedo) L_e is above zero.
 bool emits(const EllipsoidMedium& medium) {
     if (medium.density_scale == 0) return false;
@@ -239,11 +255,13 @@ Scene build_scene(const JsonValue& root, const SceneSource& source, const Path& 
     const SectionReader render = top.section("render");
     scene.render = read_render(render);
 
+    AssetMemory memory(source);
     // Lights first: they are cheap to read, and so their mistakes are told before a large file is loaded.
     if (const JsonValue* lights = top.value("lights"))
         for (const JsonValue& item : lights->items) {
             const SectionReader section(source, "lights", &item, lights->at);
             scene.lights.push_back(read_light(section, folder));
+            memory.add(item.at, scene.lights.back().image.rgb.size() * sizeof(float));
             const LightKind kind = scene.lights.back().kind;
             if (scene.render.light_sampling == LightSampling::phase &&
                 (kind == LightKind::point || kind == LightKind::spot || kind == LightKind::directional))
@@ -257,12 +275,15 @@ Scene build_scene(const JsonValue& root, const SceneSource& source, const Path& 
             const SectionReader section(source, "media", &item, item.at);
             if (section.variant() == "grid") {
                 scene.grids.push_back(read_grid(section, folder));
+                const GridMedium& grid = scene.grids.back();
+                memory.add(item.at, byte_size(grid.density) + (grid.emission_grid ? byte_size(*grid.emission_grid) : 0));
                 emission = emission || emits(scene.grids.back());
                 continue;
             }
             scene.media.push_back(read_ellipsoids(section, folder));
             emission = emission || emits(scene.media.back());
             primitives += scene.media.back().primitives.size();
+            memory.add(item.at, scene.media.back().primitives.size() * sizeof(Primitive));
             if (primitives > most_primitives) source.fail(item.at, "more primitives than 32-bit numbers can name");
         }
     if (scene.lights.empty() && !emission)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // From a scene file to the scene model: reads the JSON, applies the command line's overrides, checks everything against
 // the schema and against itself, and loads the files it names. Degrees become radians, encodings, normalization and
-// transforms are applied here, once.
+// transforms are applied here, once. What the scene file alone makes it hold stays within `scene_memory` (memory_bound.h).
 #pragma once
 
 #include <filesystem>

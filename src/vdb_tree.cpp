@@ -37,7 +37,7 @@ class TreeReader {
         if (const int buffers = in_.get<std::int32_t>(); buffers != 1)
             in_.fail(fmt::format("corrupt or unsupported: a tree with {} buffers", buffers));
         const auto background = in_.get<Value>();
-        BrickSet bricks(in_.name(), static_cast<double>(background));
+        BrickSet bricks(in_.name(), static_cast<double>(background), in_.size());
         const auto tiles = in_.get<std::uint32_t>(), children = in_.get<std::uint32_t>();
         for (std::uint32_t i = 0; i < tiles; ++i) {
             const glm::ivec3 origin = root_origin();

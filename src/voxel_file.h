@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Files of voxel grids: which grids one holds, and each of them on demand. The format follows from the extension.
-// What a file makes the reader allocate is bounded by its size: 64 times its bytes for .vol and .raw of floats (a brick for each
-// sample of a one-voxel column), 256 for .vol of bytes, 16 for .vdb and for the grids of .nvdb, which unpack to at most 1100 times
-// their compressed bytes; active tiles of sparse files may exceed it, up to half of the machine's memory.
+// What a file makes the reader hold is bounded by its size: `dense_memory` and `sparse_memory` of memory_bound.h.
 #pragma once
 
 #include <filesystem>

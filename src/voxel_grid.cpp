@@ -12,6 +12,7 @@
 
 #include "src/error.h"
 #include "src/input_file.h"
+#include "src/memory_bound.h"
 #include "src/parallel.h"
 
 namespace clume {
@@ -106,13 +107,20 @@ VoxelGrid make_dense_grid(const std::string& name, const glm::ivec3& size, const
     return grid;
 }
 
-BrickSet::BrickSet(std::string name, double background) : name_(std::move(name)) {
+BrickSet::BrickSet(std::string name, double background, std::uint64_t file_bytes)
+    : name_(std::move(name)), file_bytes_(file_bytes) {
     if (!std::isfinite(static_cast<float>(background)))
         fail(fmt::format("the background is {}; it must be finite", background));
     background_ = std::max(static_cast<float>(background), 0.0f);
 }
 
 void BrickSet::fail(const std::string& why) const { throw SceneError(fmt::format("{}: {}", name_, why)); }
+
+void BrickSet::check_count(std::uint64_t bricks) const {
+    check_brick_memory(name_, bricks);
+    check_memory(name_, sparse_memory, static_cast<double>(bricks) * (brick_samples * sizeof(float) + sizeof(glm::ivec3) + sizeof(Entry)),
+                 file_bytes_);
+}
 
 void BrickSet::grow(const glm::ivec3& lo, const glm::ivec3& hi) {
     lo_ = glm::min(lo_, lo);
@@ -133,14 +141,14 @@ void BrickSet::add_tile(const glm::ivec3& lo, int side, double value) {
     grow(lo, lo + side);
     if (kept == background_) return;
     const auto across = static_cast<std::uint64_t>(side / 8);
-    check_brick_memory(name_, entries_.size() + across * across * across);
+    check_count(entries_.size() + across * across * across);
     for (int z = 0; z < side; z += 8)
         for (int y = 0; y < side; y += 8)
             for (int x = 0; x < side; x += 8) entries_.push_back({lo + glm::ivec3(x, y, z), kept, no_source});
 }
 
 VoxelGrid BrickSet::build(const LeafSource& leaves) {
-    check_brick_memory(name_, entries_.size());
+    check_count(entries_.size());
     std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return before(a.origin, b.origin); });
     for (std::size_t i = 1; i < entries_.size(); ++i)
         if (entries_[i].origin == entries_[i - 1].origin)
@@ -174,8 +182,11 @@ VoxelGrid BrickSet::build(const LeafSource& leaves) {
         grid.brick_origins.push_back(entry.origin);
         grid.values.insert(grid.values.end(), std::begin(samples), std::end(samples));
     }
-    grid.brick_origins.shrink_to_fit();
-    grid.values.shrink_to_fit();
+    // Not for a little: while it moves, both are there.
+    if (grid.values.size() < grid.values.capacity() / 2) {
+        grid.brick_origins.shrink_to_fit();
+        grid.values.shrink_to_fit();
+    }
     if (lo_.x < hi_.x) {
         grid.lo = lo_;
         grid.hi = hi_;

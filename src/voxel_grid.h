@@ -32,7 +32,8 @@ VoxelGrid make_dense_grid(const std::string& name, const glm::ivec3& size, const
 class BrickSet {
   public:
     /// Messages begin with `name`. Samples are `background`, clamped to 0, where nothing is set. Throws if it isn't finite.
-    BrickSet(std::string name, double background);
+    /// Bricks are limited by the size of the file that they come from [memory_bound.h].
+    BrickSet(std::string name, double background, std::uint64_t file_bytes);
 
     /// A brick of samples that build() asks for.
     void add_leaf(const glm::ivec3& origin, std::uint32_t source) { entries_.push_back({origin, 0, source}); }
@@ -56,11 +57,13 @@ class BrickSet {
     };
 
     [[noreturn]] void fail(const std::string& why) const;
+    void check_count(std::uint64_t bricks) const;
     float admit(float value, const glm::ivec3& at);
     void grow(const glm::ivec3& lo, const glm::ivec3& hi);
 
     std::string name_;
     float background_ = 0;
+    std::uint64_t file_bytes_;
     std::vector<Entry> entries_;
     glm::ivec3 lo_{largest_lattice_coordinate}, hi_{-largest_lattice_coordinate};
     std::size_t negative_ = 0;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "src/json_reader.h"
+#include "src/printable.h"
 #include "src/voxel_file.h"
 #include "src/voxel_grid.h"
 
@@ -45,7 +46,7 @@ void print_voxel_info(const std::filesystem::path& path) {
 }
 
 void print_grid_medium(std::size_t index, const GridMedium& medium) {
-    fmt::print("  medium {}        {}: {}{}, density_scale {:g}\n", index, medium.source,
+    fmt::print("  medium {}        {}: {}{}, density_scale {:g}\n", index, printable(medium.source),
                medium.grid_name.empty() ? "" : "grid " + in_quotes(medium.grid_name) + ", ",
                medium.interpolation == Interpolation::nearest ? "nearest" : "trilinear", medium.density_scale);
     print_grid(medium.density, medium.density_scale);

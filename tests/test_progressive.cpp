@@ -2,6 +2,7 @@
 // `progressive` as a whole: from bounds far too low its bias falls below the noise as passes grow, what it says of its bounds
 // falls with it, and an image is a function of seed and samples alone.
 #include "runtime/device.h"
+#include "src/strategies.h"
 #include "tests/pairs.h"
 
 using namespace clume;
@@ -116,5 +117,24 @@ TEST_CASE("Progressive.IsAFunctionOfTheSamples") {
         options.cpu_split = 2;
         options.devices = {"cpu"};
         check("two devices");
+    }
+}
+
+TEST_CASE("Progressive.PartsOfInterleavedSeedsAddUpToSingleRuns") {
+    // What one seed has learned is no part of the other, and a pass may end in the middle.
+    Scene scene = with_pair(body(), {"progressive", "analytic"});
+    RenderOptions options = from_too_low(1);
+    Renderer renderer(scene, options);
+    Accumulation a = renderer.start(5), b = renderer.start(6);
+    for (const std::uint32_t end : {1u, 3u, 5u, 6u, 13u, 21u}) {
+        renderer.extend(a, end);
+        renderer.extend(b, end);
+    }
+    for (const auto& [film, seed] : {std::pair{&a, 5u}, {&b, 6u}}) {
+        Renderer alone(scene, options);
+        Accumulation whole = alone.start(seed);
+        alone.extend(whole, 21);
+        CHECK(renderer.result(*film).image.rgb == alone.result(whole).image.rgb);
+        CHECK(renderer.result(*film).stats.excess == alone.result(whole).stats.excess);
     }
 }

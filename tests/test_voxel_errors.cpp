@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // What is wrong with voxel files and what is said about it; damaged ones never crash, hang or take memory.
-#include <sys/resource.h>
-
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
@@ -11,6 +9,7 @@
 #include "src/voxel_file.h"
 #include "src/voxel_grid.h"
 #include "tests/library_voxels.h"
+#include "tests/memory_limit.h"
 #include "tests/temp_folder.h"
 #include "tests/voxel_scene.h"
 
@@ -72,26 +71,6 @@ template <class Value>
 std::string raw(Value value) {
     return bytes_of<Value>({value});
 }
-
-/// Limits the address space while it lives, so that a reader that asks for more gets std::bad_alloc.
-class MemoryLimit {
-  public:
-    explicit MemoryLimit([[maybe_unused]] std::uint64_t extra) {
-        getrlimit(RLIMIT_AS, &before_);
-#ifndef __SANITIZE_ADDRESS__
-        std::ifstream in("/proc/self/statm");
-        std::uint64_t pages = 0;
-        in >> pages;
-        rlimit limit = before_;
-        limit.rlim_cur = std::min<rlim_t>(before_.rlim_cur, pages * 4096 + extra);
-        setrlimit(RLIMIT_AS, &limit);
-#endif
-    }
-    ~MemoryLimit() { setrlimit(RLIMIT_AS, &before_); }
-
-  private:
-    rlimit before_{};
-};
 
 }  // namespace
 
