@@ -270,7 +270,15 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     });
 
     // One table: roots, then all blocks; leaves in the order of their roots.
-    for (const auto& s : subtrees) cells.levels = std::max(cells.levels, s.depth);
+    std::size_t entries = roots, leaf_count = 0;
+    for (const auto& s : subtrees) {
+        cells.levels = std::max(cells.levels, s.depth);
+        entries += s.blocks.size();
+        leaf_count += s.leaves.size();
+    }
+    require_memory("cells", {{"table", entries * sizeof(std::uint32_t)}, {"leaves", leaf_count * sizeof(Cells::Leaf)}});
+    cells.table.reserve(entries);
+    cells.leaves.reserve(leaf_count);
     cells.table.assign(roots, 1);
     const auto place = [&](std::uint32_t entry, std::size_t first_block, std::size_t first_leaf) -> std::uint32_t {
         if (entry & CELL_INNER) return CELL_INNER | static_cast<std::uint32_t>(roots + 8 * ((entry & ~CELL_INNER) + first_block));

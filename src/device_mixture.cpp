@@ -29,6 +29,7 @@ public:
     /// Makes room for more groups; the index of the first.
     std::size_t extend(std::size_t groups) {
         const std::size_t first = out_.group_medium.size();
+        require_memory("groups of primitives", {{"groups for the device", (first + groups) * (4 * CLUME_GROUP_FLOATS + sizeof(device::uint))}});
         out_.group_medium.resize(first + groups);
         out_.groups.resize((first + groups) * CLUME_GROUP_FLOATS);
         return first;
@@ -130,6 +131,7 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
             references += leaf.primitives.size();
         }
     }
+    require_memory("cells", {{"table for the device", cells.table.size() * sizeof(device::CellEntry)}, {"references", references * sizeof(device::Reference)}, {"primitives", out.ellipsoids.size() * sizeof(device::Primitive)}});
     out.cells.resize(cells.table.size());
     for (std::size_t i = 0; i < cells.table.size(); ++i) {
         const device::uint link = cells.table[i];
@@ -139,7 +141,6 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
         out.cells[i] = {link, static_cast<float>(cells.leaves[leaf].majorant), first_reference[leaf], static_cast<device::uint>(cells.leaves[leaf].primitives.size())};
     }
     if (std::max(groups, references) > 0x7fffffffu) throw RenderError("the cells need more than 2^31 references");
-    require_memory("cells", {{"groups", 4 * groups * CLUME_GROUP_FLOATS}, {"references", references * sizeof(device::Reference)}});
     writer.extend(groups);
     out.references.resize(references);
     parallel_chunks(cells.leaves.size(), 256, [&](std::size_t begin, std::size_t end) {

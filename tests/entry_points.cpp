@@ -141,6 +141,7 @@ Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t cou
     Probe probe(device, width);
     const SelfTestResult arithmetic = self_test(device, width);
     out["probe_arithmetic"] = {arithmetic.error.empty() ? 0u : 1u, arithmetic.outside_exact_set.empty() ? 0u : 1u};
+    out["probe_words"] = {arithmetic.error.empty() ? 0u : 1u};
     for (const Domain& d : kDomains) {
         const std::vector<float> x = arguments(d, count);
         std::vector<float> y;
