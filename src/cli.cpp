@@ -43,8 +43,7 @@ constexpr std::array key_flags{
     KeyFlag{"--majorant-grid", "render.majorant_grid", "N", "cells along the longest axis of a grid of bounds", true},
 };
 
-constexpr const char* overview =
-    "clume renders mixtures of ellipsoids (smoke, fire, clouds) by path tracing, on any OpenCL device.\n";
+constexpr const char* overview = "clume renders mixtures of ellipsoids (smoke, fire, clouds) by path tracing, on any OpenCL device.\n";
 constexpr const char* exit_codes =
     "Exit codes: 0 done, 1 render failed, 2 wrong command line, 3 wrong scene or asset, 4 no such device or none left, 130 interrupted.";
 
@@ -167,7 +166,6 @@ RenderCommand check_render(RenderTexts texts, RenderCommand command) {
         throw UsageError("--stats-json " + texts.stats_json + ": is the name of the image");
 
     if (!texts.memory_limit.empty()) command.memory_limit = parse_byte_size("--memory-limit", texts.memory_limit);
-
     RenderOptions& options = command.options;
     std::array<std::uint32_t, 2> range{};
     if (!texts.sample_range.empty()) {
@@ -185,9 +183,8 @@ RenderCommand check_render(RenderTexts texts, RenderCommand command) {
     if (texts.time_limit_s && !(*texts.time_limit_s > 0 && std::isfinite(*texts.time_limit_s)))
         throw UsageError("--time-limit: must be a positive number of seconds");
     options.time_limit_s = texts.time_limit_s;
-    if (texts.kernel_timeout_s && !(*texts.kernel_timeout_s >= 0 && *texts.kernel_timeout_s <= 1e6))
-        throw UsageError("--kernel-timeout: must be 0 (never) to 1e6 seconds");
     options.kernel_timeout_s = texts.kernel_timeout_s.value_or(options.kernel_timeout_s);
+    if (!(options.kernel_timeout_s >= 0 && options.kernel_timeout_s <= 1e6)) throw UsageError("--kernel-timeout: must be 0 (never) to 1e6 seconds");
     if (texts.cpu_split && *texts.cpu_split < 1) throw UsageError("--cpu-split: must be at least 1");
     options.cpu_split = texts.cpu_split.value_or(0);
     options.devices = texts.devices;
@@ -261,8 +258,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     render->allow_extras();
     render->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     render->add_option("SCENE", texts.scene, "scene file (JSON, docs/scene.md)")->type_name("");
-    render->add_option("-o,--output", texts.output, "image to write; default: the scene's name, in the current folder")
-        ->type_name("OUT.exr");
+    render->add_option("-o,--output", texts.output, "image to write; default: the scene's name, in the current folder")->type_name("OUT.exr");
     std::map<const CLI::Option*, const char*> keys;
     for (const KeyFlag& flag : key_flags) {
         CLI::Option* option = render->add_option(flag.flag)->description(help_of(flag))->type_name(flag.value);
@@ -271,10 +267,8 @@ Command parse_command_line(int argc, const char* const* argv) {
     render->add_option("--sample-range", texts.sample_range, "only samples A to B - 1 of each pixel")->type_name("A:B");
     render->add_option("--crop", texts.crop, "only this part of the film, half-open")->type_name("x0,y0,x1,y1");
     render->add_option("--time-limit", texts.time_limit_s, "stop after this long and write what is done")->type_name("SECONDS");
-    render->add_option("--kernel-timeout", texts.kernel_timeout_s, "a device silent for so long hangs and is given up; default 120; 0: never")
-        ->type_name("SECONDS");
-    render->add_option("--memory-limit", texts.memory_limit, "most memory to use, such as 512M or 2G; default: what is free")
-        ->type_name("SIZE");
+    render->add_option("--kernel-timeout", texts.kernel_timeout_s, "a device silent for so long hangs and is given up; default 120; 0: never")->type_name("SECONDS");
+    render->add_option("--memory-limit", texts.memory_limit, "most memory to use, such as 512M or 2G; default: what is free")->type_name("SIZE");
     render->add_option("--device", texts.devices, "id, part of a name, cpu, gpu or all; several with commas or repeated")
         ->type_name("DEVICE")
         ->take_all()

@@ -316,7 +316,7 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     if (r.root_finding == "bisection") define("CLUME_BISECTION", 1);
     define("CLUME_ACCEL", wanted.bvh ? 2 : 1);
     define("CLUME_COUNT", options.count_work || out.strategy == "progressive");  // its look-ups are reported
-    if (wanted.bvh) define("CLUME_BVH_STACK", out.bvh_stack);
+    if (wanted.bvh) define("CLUME_BVH_STACK", std::max(1u, out.bvh_stack));  // OpenCL C knows no empty arrays
     define("CLUME_MIXTURE", !out.ellipsoids.empty() || scene.grids.empty());
     define_grids(scene, voxels, out);
     if (!out.cells.empty()) define("CLUME_CELL_LEVELS", options.most_pixels > 0 ? 8 : out.params.cells_levels);  // a pilot's bounds share a program

@@ -51,12 +51,12 @@ stage 'the tests' "$tests" "${arguments[@]}"
 if ((all)); then
     if get_intel; then
         # What compares every building block of the kernels with other arithmetic, and what holds of any device.
-        stage "the kernels on Intel's runtime" on_intel "$tests" '[kernels],Determinism.*,Launches.*,Film.*,Runtime.*'
+        stage "the kernels on Intel's runtime" on_intel "$tests" -d yes '[kernels],Determinism.*,Launches.*,Film.*,Runtime.*'
     else
         skip "Intel's OpenCL runtime ($reason)"
     fi
     [[ -n $oclgrind ]] || skip 'Oclgrind (not installed)'
-    stage 'all implementations beside each other' on_all "$tests" '[implementations]'
+    stage 'all implementations beside each other' on_all "$tests" -d yes '[implementations]'
 fi
 ((deep == 0 || fuzz > 0)) || fuzz=20
 if ((fuzz)); then stage 'fuzzing the readers' "$root/tests/fuzz/run.sh" "$fuzz"; fi
