@@ -51,7 +51,7 @@ stage 'the tests' "$tests" "${arguments[@]}"
 if ((all)); then
     if get_intel; then
         # What compares every building block of the kernels with other arithmetic, and what holds of any device.
-        stage "the kernels on Intel's runtime" on_intel "$tests" -d yes '[kernels],Determinism.*,Launches.*,Film.*,Runtime.*'
+        stage "the kernels on Intel's runtime" on_intel "$tests" -d yes '[kernels],Determinism.*,Launches.*,Film.*,Device.*,Program.*,Buffer.*,Queue.*'
     else
         skip "Intel's OpenCL runtime ($reason)"
     fi
