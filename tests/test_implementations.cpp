@@ -110,9 +110,11 @@ TEST_CASE("Implementations.ShareARender", "[implementations]") {
     for (const Pair& pair : {Pair{"delta", "ratio", "grid"}, Pair{"progressive", "analytic", "scene"}}) {
         const std::vector<DeviceInfo> devices = one_of_each();
         RenderOptions alone;
+        alone.kernel_timeout_s = 0;  // an interpreter is slow, and does not hang
+        alone.progressive_warm_up = 2;
+        RenderOptions shared = alone;
         alone.devices = {devices[0].id};
         const RenderResult reference = render_pair(pair, everything(true), 6, 5, alone);
-        RenderOptions shared;
         for (const DeviceInfo& d : devices) shared.devices.push_back(d.id);
         for (const std::uint32_t batch : {0u, 1u, 2u}) {
             for (const int split : {0, 2}) {
