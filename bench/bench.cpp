@@ -16,6 +16,7 @@
 #include "src/cli.h"
 #include "src/error.h"
 #include "src/output_file.h"
+#include "src/strategies.h"
 
 namespace clume {
 namespace {
@@ -67,13 +68,17 @@ std::optional<bench::Options> parse(int argc, char** argv) {
         if (word.empty() || word[0] != '-') throw UsageError("bench: unexpected argument '" + word + "'; to choose items: --filter '" + word + "'");
         throw UsageError("bench: unknown flag '" + word + "'; the nearest is '" + nearest_flag(word.substr(0, word.find('=')), flag_names(app)) + "'");
     }
-    const auto one_of = [](const char* flag, const std::string& value, std::initializer_list<const char*> names) {
+    const auto one_of = [](const char* flag, const std::string& value, const std::vector<const char*>& names) {
         if (std::none_of(names.begin(), names.end(), [&](const char* name) { return value == name; }))
             throw UsageError(fmt::format("bench: {} {}: must be one of {}", flag, value, fmt::join(names, ", ")));
     };
     if (app.count("--width") > 0) one_of("--width", std::to_string(o.width), {"16", "8", "4", "1"});
     if (app.count("--rounds") > 0 && (o.rounds < 1 || o.rounds > 1000)) throw UsageError("bench: --rounds: must lie between 1 and 1000");
-    if (app.count("--strategy") > 0) one_of("--strategy", o.strategy, {"auto", "delta", "decomposition", "regular", "progressive", "regular-linear", "march-analytic", "march"});
+    if (app.count("--strategy") > 0) {
+        std::vector<const char*> names{"auto"};
+        for (const Method& m : strategies()) names.push_back(m.name);
+        one_of("--strategy", o.strategy, names);
+    }
     one_of("--accelerator", o.accelerator, {"auto", "cells", "bvh"});
     return o;
 }

@@ -12,6 +12,7 @@
 #include <numeric>
 
 #include "src/error.h"
+#include "src/json_text.h"
 
 namespace clume::bench {
 
@@ -86,11 +87,10 @@ std::string Session::to_json() {
     rapidjson::PrettyWriter<rapidjson::StringBuffer> out(buffer);
     out.SetIndent(' ', 2);
     const auto key = [&](const std::string& name) { out.Key(name.c_str(), static_cast<rapidjson::SizeType>(name.size())); };
-    const auto text = [&](const char* name, std::string value) {
-        for (char& c : value)
-            if (static_cast<unsigned char>(c) >= 0x80) c = '?';  // a driver may call its device anything
+    const auto text = [&](const char* name, const std::string& value) {
+        const std::string valid = json_text(value);
         out.Key(name);
-        out.String(value.c_str(), static_cast<rapidjson::SizeType>(value.size()));
+        out.String(valid.c_str(), static_cast<rapidjson::SizeType>(valid.size()));
     };
     const auto number = [&](double value) { std::isfinite(value) ? out.Double(value) : out.Null(); };
     out.StartObject();

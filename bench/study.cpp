@@ -33,7 +33,8 @@ std::string figure(double value) { return std::isfinite(value) ? fmt::format("{:
 
 void bench_study_section(Session& session) {
     session.section("study", "What docs/strategies.md shows; the numbers are in DOCS/images/strategies/*.csv.");
-    const Report report(session.options().study);
+    const std::filesystem::path docs = session.options().study;
+    const Report report(docs / "strategies.md", docs / "images" / "strategies", "clume bench --study");
     study_sweeps(session, report);
     study_estimators(session, report);
     study_homogeneous(session, report);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bench/measure.h"
-#include "bench/report.h"
+#include "src/doc_report.h"
 
 namespace clume::bench {
 

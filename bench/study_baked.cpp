@@ -34,7 +34,7 @@ void study_baked(Session& session, const Report& report) {
         for (EllipsoidMedium& m : mixture.media)
             for (Primitive& p : m.primitives) p.albedo = glm::dvec3(0.9);  // a grid has one for all
         const auto pairs = methods({"delta:tree/analytic", "delta:tree/ratio", "delta:tree/residual-ratio"});
-        MeasureOptions options = study_options(session, 8);
+        MeasureOptions options = study_options(session, 24);
         double exact_efficiency = 0;
         // Squared error of a pixel after T processor seconds: the mixture's is E/T, the grid's bias² + e/T. They cross at E/T = bias² E/(E − e).
         const auto crossing = [&](double efficiency, double rms) {

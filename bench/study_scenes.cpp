@@ -51,7 +51,7 @@ Scene study_ball(const BallSpec& spec, int side) {
     medium.kernel = spec.family;
     medium.extent = reference::default_extent(spec.family);
     const double scale = support_radius(spec) / medium.extent, a = std::cbrt(spec.anisotropy);
-    const glm::dvec3 axes = scale * glm::dvec3(a, a, 1 / (a * a));
+    const glm::dvec3 axes = scale * (spec.needles ? glm::dvec3(a * a, 1 / a, 1 / a) : glm::dvec3(a, a, 1 / (a * a)));
     medium.primitives.reserve(spec.n);
     reference::HostRandom random(spec.seed, 2);
     for (std::uint32_t i = 0; i < spec.n; ++i) {

@@ -14,7 +14,8 @@ struct BallSpec {
     std::uint32_t n = 10000;
     double overlap = 8;       ///< supports that cover a point well inside the ball, on average
     double depth = 10;        ///< optical depth along the ball's diameter, on average
-    double anisotropy = 1;    ///< longest over shortest axis: discs, of a volume that `overlap` gives
+    double anisotropy = 1;    ///< longest over shortest axis, of a volume that `overlap` gives
+    bool needles = false;     ///< one long axis and two short ones, instead of a disc's two long and one short
     KernelFamily family = KernelFamily::gaussian;
     bool sun = false;         ///< a directional light, to be sampled; else constant light, which no path needs to sample
     std::uint64_t seed = 1;

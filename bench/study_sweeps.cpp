@@ -83,33 +83,36 @@ PointOf ball_point(double x, const Change& change) {
 
 void study_sweeps(Session& session, const Report& report) {
     const auto all = methods({"delta:tree", "delta:grid", "delta:scene", "decomposition", "regular", "regular-linear", "march-analytic", "march", "progressive"});
-    const auto main = methods({"delta:tree", "delta:scene", "decomposition", "regular", "march-analytic", "march", "progressive"});  // the other two follow a neighbour
     std::vector<PointOf> points;
     for (const double x : {1., 2., 4., 8., 16., 32., 64., 128.}) points.push_back(ball_point(x, [](BallSpec& s, double v) { s.overlap = v; }));
-    sweep(session, report, "overlap", "More primitives over a point (10⁴ primitives, optical depth 10)", "supports over a point", points, main);
+    sweep(session, report, "overlap", "More primitives over a point (10⁴ primitives, optical depth 10)", "supports over a point", points, all);
     points.clear();
     for (const double x : {0.1, 1., 10., 100., 1000.}) points.push_back(ball_point(x, [](BallSpec& s, double v) { s.depth = v; }));
-    sweep(session, report, "density", "Denser (10⁴ primitives, overlap 8)", "optical depth along the diameter", points, main);
+    sweep(session, report, "density", "Denser (10⁴ primitives, overlap 8)", "optical depth along the diameter", points, all);
     points.clear();
-    for (const double x : {1., 10., 100., 1000.})
-        points.push_back(ball_point(x, [](BallSpec& s, double v) {
-            s.n = 30000;
-            s.overlap = 4;
-            s.anisotropy = v;
-        }));
-    sweep(session, report, "anisotropy", "Flatter (3·10⁴ discs, overlap 4, optical depth 10)", "longest over shortest axis", points, main);
-    points.clear();
+    for (const bool needles : {false, true}) {
+        for (const double x : {1., 10., 100., 1000.})
+            points.push_back(ball_point(x, [needles](BallSpec& s, double v) {
+                s.n = 30000;
+                s.overlap = 4;
+                s.anisotropy = v;
+                s.needles = needles;
+            }));
+        const std::string body = needles ? "needles" : "discs";
+        sweep(session, report, body, fmt::format("{} (3·10⁴ {}, overlap 4, optical depth 10)", needles ? "Longer" : "Flatter", body), "longest over shortest axis", points, all);
+        points.clear();
+    }
     for (const double x : {100., 1000., 1e4, 1e5, 1e6})
         points.push_back(ball_point(x, [](BallSpec& s, double v) { s.n = static_cast<std::uint32_t>(v); }));
     for (PointOf& p : points) p.name = fmt::format("{:.0f}", p.x);
-    sweep(session, report, "count", "More and smaller primitives (overlap 8, optical depth 10)", "primitives", points, main);
+    sweep(session, report, "count", "More and smaller primitives (overlap 8, optical depth 10)", "primitives", points, all);
     points.clear();
     for (const auto& [name, family] : {std::pair{"gaussian", KernelFamily::gaussian}, {"epanechnikov", KernelFamily::epanechnikov}, {"uniform", KernelFamily::uniform}}) {
         BallSpec spec;
         spec.family = family;
         points.push_back({name, 0, [spec] { return study_ball(spec); }});
     }
-    sweep(session, report, "family", "", "", points, main);
+    sweep(session, report, "family", "", "", points, all);
     points.clear();
     for (const char* name : {"plume", "smoke_close", "smoke_dense", "fire"}) points.push_back({name, 0, [name] { return study_file(name); }});
     sweep(session, report, "scenes", "", "", points, all);

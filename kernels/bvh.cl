@@ -55,30 +55,51 @@ static void bvh_decompose(float3 o, float3 d, float t_begin, uint2 key, float* b
     }
 }
 
+/// Where a walk over the groups of the bvh stands; its stack is the caller's, so that this can stay in registers.
+typedef struct {
+    float8 entry;  // of the ray into the boxes of the node that is open
+    uint node;
+    int child;     // next one of it
+    int height;    // of the stack
+} BvhWalk;
+
+static void bvh_begin(BvhWalk* w, uint* stack) {
+    stack[0] = 0;
+    w->height = 1;
+    w->child = BVH_ARITY;
+}
+
+/// The next group that the ray may meet between t_begin and t_end, in no order of distance; BVH_NONE when there is none left.
+static uint bvh_next(BvhWalk* w, uint* stack, float3 o, float3 inverse, float t_begin, float t_end, Work* work, __global const BvhNode* nodes) {
+    for (;;) {
+        while (w->child < BVH_ARITY) {
+            const int i = w->child++;
+            const uint child = nodes[w->node].child[i];
+            if (child == BVH_NONE || !(((const float*)&w->entry)[i] < t_end)) continue;
+            if (child & BVH_LEAF) {
+                COUNT(work, WORK_GROUPS, 1);
+                return child & ~BVH_LEAF;
+            }
+            stack[w->height++] = child;
+        }
+        if (w->height == 0) return BVH_NONE;
+        COUNT(work, WORK_NODES, 1);
+        w->node = stack[--w->height];
+        w->entry = bvh_test(nodes + w->node, o, inverse, t_begin, t_end);
+        w->child = 0;
+    }
+}
+
 /// Optical depth between t_begin and t_end, or any partial sum that has reached `limit`.
 static ulong bvh_depth(float3 o, float3 d, float t_begin, float t_end, ulong limit, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
+    BvhWalk w;
     const float3 inverse = ray_inverse(d);
     ulong depth = 0;
-    int height = 0;
-    uint node = 0;
-    for (;;) {
-        COUNT(work, WORK_NODES, 1);
-        const float8 entry = bvh_test(nodes + node, o, inverse, t_begin, t_end);
-        const float* near = (const float*)&entry;
-        for (int i = 0; i < BVH_ARITY; ++i) {
-            const uint child = nodes[node].child[i];
-            if (child == BVH_NONE || !(near[i] < t_end)) continue;
-            if (child & BVH_LEAF) {
-                COUNT(work, WORK_GROUPS, 1);
-                depth += group_depth(child & ~BVH_LEAF, o, d, t_begin, t_end, -CLUME_INFINITY, CLUME_INFINITY, SCENE);
-            } else {
-                stack[height++] = child;
-            }
-        }
-        if (height == 0 || depth >= limit) return depth;
-        node = stack[--height];
-    }
+    bvh_begin(&w, stack);
+    for (uint group; depth < limit && (group = bvh_next(&w, stack, o, inverse, t_begin, t_end, work, nodes)) != BVH_NONE;)
+        depth += group_depth(group, o, d, t_begin, t_end, -CLUME_INFINITY, CLUME_INFINITY, SCENE);
+    return depth;
 }
 
 static float bvh_density(float3 p, uint* primitive, float u, Work* work, SCENE_ARGS) {

@@ -3,7 +3,8 @@
 // steps per pixel around the pixel where the scene's centre projects, so that float loses nothing to a far camera.
 #include "rng.cl"
 
-/// Ray through film point (x + u, y + v), u and v in (0, 1): origin on the plane, direction of unit length.
+/// Ray through film point (x + u, y + v), u and v in (0, 1): origin on the plane, origin error < 2 ulp of the radius (of |o| if that is greater); direction of unit
+/// length, direction error < 3e-7 absolute.
 static void camera_ray(__constant const RenderParams* params, uint x, uint y, float u, float v, float3* o, float3* d) {
     const float fx = ((float)x - params->film_cx) + u, fy = ((float)y - params->film_cy) + v;
     o->x = fma(fx, params->plane_x.x, fma(fy, params->plane_y.x, params->plane_c.x));

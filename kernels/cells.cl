@@ -32,17 +32,24 @@ static void cells_exit(CellWalk* w) {
     w->t_exit = max_s(w->t, w->t_cross);
 }
 
+/// The cell below root cell `root` that holds finest-level position `at`; its edge is 2^*shift finest cells.
+static CellEntry cells_descend(int root, int4 at, int* shift, const int levels, __global const CellEntry* cells) {
+    CellEntry entry = cells[root];
+    *shift = levels;
+    while (CELL_IS_INNER(entry.link, levels)) {
+        *shift -= 1;
+        const int4 bit = (at >> (int4)*shift) & (int4)1;
+        entry = cells[(entry.link & ~CELL_INNER) + (uint)(bit.x + 2 * bit.y + 4 * bit.z)];
+    }
+    return entry;
+}
+
 /// Sets the cell that holds finest-level position `at`, inside the table, and when the ray leaves it.
 static void cells_locate(CellWalk* w, int4 at, const int levels, __global const CellEntry* cells) {
     const int4 root = at >> (int4)levels;
     w->root = root.x * (int)abs(w->stride.x) + root.y * (int)abs(w->stride.y) + root.z * (int)abs(w->stride.z);
-    CellEntry entry = cells[w->root];
-    int shift = levels;
-    while (CELL_IS_INNER(entry.link, levels)) {
-        shift -= 1;
-        const int4 bit = (at >> (int4)shift) & (int4)1;
-        entry = cells[(entry.link & ~CELL_INNER) + (uint)(bit.x + 2 * bit.y + 4 * bit.z)];
-    }
+    int shift;
+    const CellEntry entry = cells_descend(w->root, at, &shift, levels, cells);
     int size = 1 << shift;
     int4 low = (at >> (int4)shift) << (int4)shift;
     // An empty root cell knows how far around it all is empty: leave that whole block at once.
@@ -144,10 +151,6 @@ static CellEntry cells_at(float3 p, __constant const RenderParams* params, __glo
     const float x = (float)params->cells_x, y = (float)params->cells_y, z = (float)params->cells_z;
     const int4 at = (int4)(cells_position(q.x, 0.0f, x, x, CLUME_CELL_LEVELS), cells_position(q.y, 0.0f, y, y, CLUME_CELL_LEVELS), cells_position(q.z, 0.0f, z, z, CLUME_CELL_LEVELS), 0);
     const int4 root = at >> (int4)CLUME_CELL_LEVELS;
-    CellEntry entry = cells[root.x + (int)params->cells_x * (root.y + (int)params->cells_y * root.z)];
-    for (int shift = CLUME_CELL_LEVELS - 1; CELL_IS_INNER(entry.link, CLUME_CELL_LEVELS); --shift) {
-        const int4 bit = (at >> (int4)shift) & (int4)1;
-        entry = cells[(entry.link & ~CELL_INNER) + (uint)(bit.x + 2 * bit.y + 4 * bit.z)];
-    }
-    return entry;
+    int shift;
+    return cells_descend(root.x + (int)params->cells_x * (root.y + (int)params->cells_y * root.z), at, &shift, CLUME_CELL_LEVELS, cells);
 }

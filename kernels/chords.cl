@@ -225,90 +225,64 @@ static uint active_pick(const Chords* a, const int density, float t0, float t1, 
 /// unless it is null, *primitive becomes one of them by its share of the depth, u being uniform.
 static float streamed_depth(const int with_density, float3 o, float3 d, float t0, float t1, float* density, float u, uint* primitive, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
+    BvhWalk w;
     const float3 inverse = ray_inverse(d);
     float sum = 0.0f;
     *density = 0.0f;
-    int height = 0;
-    uint node = 0;
-    for (;;) {
-        COUNT(work, WORK_NODES, 1);
-        const float8 entry = bvh_test(nodes + node, o, inverse, t0, t1);
-        for (int i = 0; i < BVH_ARITY; ++i) {
-            const uint child = nodes[node].child[i];
-            if (child == BVH_NONE || !(((const float*)&entry)[i] < t1)) continue;
-            if (!(child & BVH_LEAF)) {
-                stack[height++] = child;
-                continue;
-            }
-            COUNT(work, WORK_GROUPS, 1);
-            const uint group = child & ~BVH_LEAF, family = group_family(group);
-            const float e2 = group_extent_squared(group);
-            vfloat lanes[CLUME_PARTS];
-            for (int k = 0; k < CLUME_PARTS; ++k) {
-                __global const float* part = groups + (size_t)group * CLUME_GROUP_FLOATS + k * CLUME_WIDTH;
-                Chord c;
-                vint mask = intersect(part, o, d, e2, &c);
-                const vfloat start = vselect(c.t_in, (vfloat)t0, c.t_in < (vfloat)t0), stop = vselect(c.t_out, (vfloat)t1, c.t_out > (vfloat)t1);
-                mask &= start < stop;
-                lanes[k] = vselect((vfloat)0.0f, depth_part(&c, vload_row(part + 16 * CLUME_ROW_SIGMA), start, vselect(start, stop, mask), family, (vfloat)e2), mask);
-            }
-            const float part_sum = reduce_lanes(lanes);
-            if (with_density) *density += groups_density(group, 1, along_s(o, d, t1), SCENE);
-            sum += part_sum;
-            if (primitive == 0 || !(part_sum > 0.0f)) continue;
-            // Reservoir over the groups: the newcomer wins with its share, u is stretched back to (0, 1).
-            const float share = divide_s(part_sum, sum);
-            if (!(u < share)) {
-                u = divide_s(u - share, max_s(1.0f - share, 0x1p-24f));
-                continue;
-            }
-            u = divide_s(u, share);
-            float within = 0.0f;
-            bool found = false;
-            for (int lane = 0; lane < 16 && !found; ++lane) {
-                const float own = LANE(lanes, lane);
-                if (!(own > 0.0f)) continue;
-                within += own;
-                *primitive = as_uint(groups[(size_t)group * CLUME_GROUP_FLOATS + 16 * CLUME_ROW_ID + lane]);
-                found = within > u * part_sum;
-            }
+    bvh_begin(&w, stack);
+    for (uint group; (group = bvh_next(&w, stack, o, inverse, t0, t1, work, nodes)) != BVH_NONE;) {
+        const uint family = group_family(group);
+        const float e2 = group_extent_squared(group);
+        vfloat lanes[CLUME_PARTS];
+        for (int k = 0; k < CLUME_PARTS; ++k) {
+            __global const float* part = groups + (size_t)group * CLUME_GROUP_FLOATS + k * CLUME_WIDTH;
+            Chord c;
+            vint mask = intersect(part, o, d, e2, &c);
+            const vfloat start = vselect(c.t_in, (vfloat)t0, c.t_in < (vfloat)t0), stop = vselect(c.t_out, (vfloat)t1, c.t_out > (vfloat)t1);
+            mask &= start < stop;
+            lanes[k] = vselect((vfloat)0.0f, depth_part(&c, vload_row(part + 16 * CLUME_ROW_SIGMA), start, vselect(start, stop, mask), family, (vfloat)e2), mask);
         }
-        if (height == 0) return sum;
-        node = stack[--height];
+        const float part_sum = reduce_lanes(lanes);
+        if (with_density) *density += groups_density(group, 1, along_s(o, d, t1), SCENE);
+        sum += part_sum;
+        if (primitive == 0 || !(part_sum > 0.0f)) continue;
+        // Reservoir over the groups: the newcomer wins with its share, u is stretched back to (0, 1).
+        const float share = divide_s(part_sum, sum);
+        if (!(u < share)) {
+            u = divide_s(u - share, max_s(1.0f - share, 0x1p-24f));
+            continue;
+        }
+        u = divide_s(u, share);
+        float within = 0.0f;
+        bool found = false;
+        for (int lane = 0; lane < 16 && !found; ++lane) {
+            const float own = LANE(lanes, lane);
+            if (!(own > 0.0f)) continue;
+            within += own;
+            *primitive = as_uint(groups[(size_t)group * CLUME_GROUP_FLOATS + 16 * CLUME_ROW_ID + lane]);
+            found = within > u * part_sum;
+        }
     }
+    return sum;
 }
 
 /// The segment that holds t: *begin, raised to the last end of a chord not after t, and *end, lowered to the first after it.
 static void streamed_segment(float3 o, float3 d, float t, float* begin, float* end, Work* work, SCENE_ARGS) {
     uint stack[CLUME_BVH_STACK];
+    BvhWalk w;
     const float3 inverse = ray_inverse(d);
-    int height = 0;
-    uint node = 0;
-    for (;;) {
-        COUNT(work, WORK_NODES, 1);
-        const float8 entry = bvh_test(nodes + node, o, inverse, *begin, *end);
-        for (int i = 0; i < BVH_ARITY; ++i) {
-            const uint child = nodes[node].child[i];
-            if (child == BVH_NONE || !(((const float*)&entry)[i] < *end)) continue;
-            if (!(child & BVH_LEAF)) {
-                stack[height++] = child;
-                continue;
-            }
-            COUNT(work, WORK_GROUPS, 1);
-            const uint group = child & ~BVH_LEAF;
-            for (int k = 0; k < CLUME_PARTS; ++k) {
-                Chord c;
-                const vint mask = intersect(groups + (size_t)group * CLUME_GROUP_FLOATS + k * CLUME_WIDTH, o, d, group_extent_squared(group), &c);
-                if (!vany(mask)) continue;
-                for (int lane = 0; lane < 2 * CLUME_WIDTH; ++lane) {
-                    if (!((const int*)&mask)[lane / 2]) continue;
-                    const float time = lane & 1 ? LANE(&c.t_out, lane / 2) : LANE(&c.t_in, lane / 2);
-                    if (time <= t) *begin = max_s(*begin, time);
-                    else *end = min_s(*end, time);
-                }
+    bvh_begin(&w, stack);
+    for (uint group; (group = bvh_next(&w, stack, o, inverse, *begin, *end, work, nodes)) != BVH_NONE;) {
+        for (int k = 0; k < CLUME_PARTS; ++k) {
+            Chord c;
+            const vint mask = intersect(groups + (size_t)group * CLUME_GROUP_FLOATS + k * CLUME_WIDTH, o, d, group_extent_squared(group), &c);
+            if (!vany(mask)) continue;
+            for (int lane = 0; lane < 2 * CLUME_WIDTH; ++lane) {
+                if (!((const int*)&mask)[lane / 2]) continue;
+                const float time = lane & 1 ? LANE(&c.t_out, lane / 2) : LANE(&c.t_in, lane / 2);
+                if (time <= t) *begin = max_s(*begin, time);
+                else *end = min_s(*end, time);
             }
         }
-        if (height == 0) return;
-        node = stack[--height];
     }
 }

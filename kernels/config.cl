@@ -47,21 +47,9 @@
 #ifndef CLUME_DEPTH_LIMIT  // 1: params.max_depth holds; 0: no limit
 #define CLUME_DEPTH_LIMIT 1
 #endif
-#define STRATEGY_DECOMPOSITION 1
-#define STRATEGY_DELTA 2
-#define STRATEGY_MARCH 3
-#define STRATEGY_MARCH_ANALYTIC 4
-#define STRATEGY_REGULAR 5
-#define STRATEGY_REGULAR_LINEAR 6
-#define STRATEGY_PROGRESSIVE 7
 #ifndef CLUME_STRATEGY
 #define CLUME_STRATEGY STRATEGY_DECOMPOSITION
 #endif
-#define TRANSMITTANCE_ANALYTIC 1
-#define TRANSMITTANCE_MARCH 2
-#define TRANSMITTANCE_RATIO 3
-#define TRANSMITTANCE_RESIDUAL_RATIO 4
-#define TRANSMITTANCE_BINARY 5
 #ifndef CLUME_TRANSMITTANCE
 #define CLUME_TRANSMITTANCE TRANSMITTANCE_ANALYTIC
 #endif
@@ -101,7 +89,7 @@
 #define CLUME_BVH_STACK 256
 #endif
 #ifndef CLUME_LAUNCH_EVENTS  // flights a work-item does before it saves its state for the next launch
-#define CLUME_LAUNCH_EVENTS 65536
+#define CLUME_LAUNCH_EVENTS 4096
 #endif
 #ifndef CLUME_FLIGHT_DRAWS  // tentative collisions a null-collision flight does before it pauses
 #define CLUME_FLIGHT_DRAWS 65536

@@ -167,7 +167,7 @@ static float brick_integral(const BrickWalk* b, bool nearest) {
     const float2 a = vload2(0, p), c = vload2(0, p + GRID_ROW), d = vload2(0, p + GRID_SLICE), e = vload2(0, p + GRID_SLICE + GRID_ROW);
     const float4 low = (float4)(a.x, c.x, d.x, e.x), rise = (float4)(a.y, c.y, d.y, e.y) - low;
     const float4 x = fma((float4)u.x, rise, low), y = fma((float4)v.x, rise, low);
-    const float4 first = (float4)(x.xz, y.xz), second = (float4)(x.yw, y.yw);
+    const float4 first = (float4)(x.x, x.z, y.x, y.z), second = (float4)(x.y, x.w, y.y, y.w);  // by component: Oclgrind 21.10 falls over (x.xz, y.xz)
     const float4 z = fma((float4)(u.y, u.y, v.y, v.y), second - first, first);
     const float2 value = fma((float2)(u.z, v.z), z.yw - z.xz, z.xz);
     return 0.5f * length * (value.x + value.y);

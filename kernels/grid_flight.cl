@@ -7,6 +7,10 @@
 #include "strategy_progressive.cl"
 #if CLUME_GRIDS
 
+#ifndef CLUME_GRID_STRATEGY  // what flies through voxel media: the program's own strategy, or `regular` for those of ellipsoids alone
+#define CLUME_GRID_STRATEGY STRATEGY_REGULAR
+#endif
+
 /// Where the optical depth of grid g reaches tau, CLUME_INFINITY if not before t_end: through bricks, then cells.
 static float grid_invert(uint g, float3 o, float3 d, float t_end, float tau, Work* work, SCENE_ARGS) {
     __global const GridInfo* grid = grids + g;
@@ -89,6 +93,11 @@ static float grid_flight_delta(uint g, float3 o, float3 d, float t_end, uint ran
 #if CLUME_STRATEGY == STRATEGY_PROGRESSIVE
         const uint index = bounds_learned(&w, grid);
         const float majorant = learned[index];
+        if (params->explore) {
+            const float place = progressive_place(bits.w, w.entry.link, t, min_s(w.t_exit, w.t_end));
+            const float sigma = bounds_value(&w, grid, place, grid_cells, grid_values);
+            if (sigma > majorant) atomic_max(raised + index, as_uint(sigma));
+        }
 #else
         const float majorant = w.entry.majorant;
 #endif
@@ -124,11 +133,11 @@ static float grid_flight_delta(uint g, float3 o, float3 d, float t_end, uint ran
     return CLUME_INFINITY;
 }
 
-/// The program's strategy; those of mixtures alone walk grids as `regular` does.
+/// By CLUME_GRID_STRATEGY.
 static float grid_flight(uint g, float3 o, float3 d, float t_end, uint range, const Draws* r, Flight* f, SCENE_ARGS) {
-#if CLUME_STRATEGY == STRATEGY_DELTA || CLUME_STRATEGY == STRATEGY_PROGRESSIVE
+#if CLUME_GRID_STRATEGY == STRATEGY_DELTA || CLUME_GRID_STRATEGY == STRATEGY_PROGRESSIVE
     return grid_flight_delta(g, o, d, t_end, range, r, f, SCENE);
-#elif CLUME_STRATEGY == STRATEGY_MARCH
+#elif CLUME_GRID_STRATEGY == STRATEGY_MARCH
     return grid_flight_march(g, o, d, t_end, range, r, &f->work, SCENE);
 #else
     return grid_flight_regular(g, o, d, t_end, range, r, &f->work, SCENE);

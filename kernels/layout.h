@@ -71,6 +71,20 @@ struct alignas(16) float4 {
 #define PHASE_HENYEY_GREENSTEIN 2u
 #define PHASE_RAYLEIGH 4u
 
+// Named in the tables of src/strategies.cpp.
+#define STRATEGY_DECOMPOSITION 1
+#define STRATEGY_DELTA 2
+#define STRATEGY_MARCH 3
+#define STRATEGY_MARCH_ANALYTIC 4
+#define STRATEGY_REGULAR 5
+#define STRATEGY_REGULAR_LINEAR 6
+#define STRATEGY_PROGRESSIVE 7
+#define TRANSMITTANCE_ANALYTIC 1
+#define TRANSMITTANCE_MARCH 2
+#define TRANSMITTANCE_RATIO 3
+#define TRANSMITTANCE_RESIDUAL_RATIO 4
+#define TRANSMITTANCE_BINARY 5
+
 #define LIGHT_CONSTANT 1u
 #define LIGHT_ENVMAP 2u
 #define LIGHT_POINT 4u
@@ -119,7 +133,7 @@ typedef struct RenderParams {
     uint film_width, seed_lo, seed_hi, light_count;
     int max_depth, rr_depth;
     float scene_bound;  // of the mixture's extinction, anywhere
-    uint pad0;
+    uint explore;       // 1: `progressive` also looks at one place in every cell that a ray crosses
 } RenderParams;
 
 typedef struct CellEntry {

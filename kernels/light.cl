@@ -124,6 +124,9 @@ typedef struct {
 
 #if CLUME_NEE
 /// Chooses one light, then a direction; false if the choice cannot light o. `bits` and `more` are 8 words of their own.
+/// direction error < 1e-6 absolute; its end on the light, end error < 3 ulp of the radius (of the distance if that is greater);
+/// pdf error < 3e-6 relative, value error < 3e-6 relative, both for a rectangle seen at a cosine c over c, the value for a spot
+/// to the unattenuated one; from a sphere a hundredth of its radius or more off it.
 static bool light_sample(float3 o, uint4 bits, uint4 more, LightSample* s, __constant const RenderParams* params, __global const LightInfo* lights, __global const float4* texels, __global const AliasEntry* alias) {
     const float choice = uniform_s(bits.x);
     uint i = NO_LIGHT;
@@ -199,7 +202,8 @@ static bool light_sample(float3 o, uint4 bits, uint4 more, LightSample* s, __con
         const float r = lights[i].position.w, q2 = dot_s(v, v);
         if (!(q2 > r * r)) return false;
         const float cap = sphere_cap(r, q2), u = uniform_s(bits.y);
-        s->direction = around(v * rsqrt_s(q2), fma(-u, cap, 1.0f), uniform_s(bits.z));
+        const float versine = u * cap;
+        s->direction = around(v * rsqrt_s(q2), 1.0f - versine, sqrt_s(versine * (2.0f - versine)), uniform_s(bits.z));
         s->distance = surface_hit(i, o, s->direction, CLUME_INFINITY, lights);
         // A direction that rounding moved past the limb: the surface is where it is nearest.
         if (!(s->distance < CLUME_INFINITY)) s->distance = dot_s(v, s->direction);

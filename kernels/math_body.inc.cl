@@ -34,7 +34,7 @@ static VF FN(sqrt)(VF x) {
     return SEL(r, (VF)0.0f, x < (VF)0x1p-100f);
 }
 
-/// exp(x) for x <= 88, 0 below −69 (2^-100); relative error < 1.1 ulp. x = n ln 2 + r, n by the magic-number add.
+/// exp(x) for x <= 88, 0 below −69 (2^-100); error < 1.1 ulp. x = n ln 2 + r, n by the magic-number add.
 static VF FN(exp)(VF x) {
     const VF magic = (VF)12582912.0f;
     const VF shifted = fma(x, (VF)1.44269504f, magic);
@@ -68,13 +68,13 @@ static VF FN(log)(VF x) {
     return FN(log_of)(f, e);
 }
 
-/// x as float, correctly rounded: two exact halves, one rounding.
+/// x as float, correctly rounded (error < 0.5000001 ulp): two exact halves, one rounding.
 static VF FN(from_uint)(VU x) {
     const VF hi = AS_F((x >> (VU)16) | (VU)0x53000000u) - 549764202496.0f;  // 2^39 + 2^23
     return hi + AS_F((x & (VU)0xffffu) | (VU)0x4b000000u);
 }
 
-/// −log(u), u = (x + 1/2) 2^-32: a unit exponential from 32 random bits; in [1.16e-10, 22.9], relative error < 1.8 ulp.
+/// −log(u), u = (x + 1/2) 2^-32: a unit exponential from 32 random bits; in [1.16e-10, 22.9], error < 1.8 ulp.
 /// Above u = 1/2 it works on 1 − u, taken from the complemented bits, so that small depths keep their relative accuracy.
 static VF FN(exponential)(VU x) {
     const VI upper = AS_I(x) < (VI)0;
@@ -90,7 +90,7 @@ static VF FN(exponential)(VU x) {
     return -FN(log_of)(SEL(f_lower, f_upper, upper), SEL(e_lower, e_upper, upper));
 }
 
-/// erfc(x), x >= 0; relative error < 5e-7 up to x = 8, below 2^-96 from there, 0 from 8.31. erfc = e^(−x²) t P(t), t = 1 / (1 + 0.4 x).
+/// erfc(x), x >= 0; error < 5e-7 relative up to x = 8, below 2^-96 from there, 0 from 8.31. erfc = e^(−x²) t P(t), t = 1 / (1 + 0.4 x).
 static VF FN(erfc)(VF x) {
     const VF t = FN(rcp)(fma(x, (VF)0.4f, (VF)1.0f));
     VF p = fma(t, (VF)-2.602753242e-2f, (VF)1.788328548e-1f);
@@ -108,7 +108,7 @@ static VF FN(erfc)(VF x) {
     return fma(-e, low, e) * (t * p);
 }
 
-/// x >= 0 with erfc(x) = q, 2^-90 < q <= 1; relative error < 8e-7. x = (1 − q) P(w), w = −log(q (2 − q)) [Giles 2012].
+/// x >= 0 with erfc(x) = q, 2^-90 < q <= 1; error < 8e-7 relative. x = (1 − q) P(w), w = −log(q (2 − q)) [Giles 2012].
 static VF FN(erfc_inverse)(VF q) {
     const VF z = 1.0f - q;
     const VF w = -FN(log)(q * (2.0f - q));
@@ -143,7 +143,7 @@ static VF FN(erfc_inverse)(VF q) {
     return z * p;
 }
 
-/// s in [0, 1] with s² (1 − s/3) = y, y in [0, 2/3]: the Epanechnikov penetration depth; relative error < 3e-7, 0 for y
+/// s in [0, 1] with s² (1 − s/3) = y, y in [0, 2/3]: the Epanechnikov penetration depth; error < 3e-7 relative, 0 for y
 /// below 2^-100.
 static VF FN(epanechnikov_inverse)(VF y) {
     const VF z = FN(sqrt)(y);

@@ -69,7 +69,7 @@ static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws*
     uint blocker;
     surfaces_nearest(x, s.direction, s.distance, s.light, &blocker, params, lights);
     if (blocker != NO_LIGHT) return (spectrum)0.0f;
-    const float value = phase_value(phase, g, dot_s(d, s.direction));
+    const float value = phase_value(phase, g, phase_versine(g, d, s.direction));
     const float weight = (lights[s.light].kind & CLUME_HITS) ? divide_s(s.pdf, s.pdf + value) : 1.0f;
     return s.value * (value * weight * transmittance_estimate(x, s.direction, s.distance, bits.w, r, flight, SCENE));
 #else

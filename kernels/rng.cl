@@ -33,7 +33,7 @@ static uint4 philox(uint4 counter, uint2 key) {
 /// floor(x · n / 2^32): uniform in [0, n) for 32 random bits, to within n 2^-32.
 static uint uniform_index(uint x, uint n) { return (uint)(((ulong)x * n) >> 32); }
 
-/// Uniform in (0, 1): (x + 1/2) 2^-32 rounded to float, kept below 1.
+/// Uniform in (0, 1): (x + 1/2) 2^-32 rounded to float, kept below 1; error < 1.3e-7 relative.
 static float uniform_s(uint x) { return min_s((from_uint_s(x) + 0.5f) * 0x1p-32f, 0x1.fffffep-1f); }
 
 /// 32 random bits per primitive id under a 64-bit key: a bijective mixer (three multiply-xorshift rounds). Keys are words of

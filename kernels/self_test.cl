@@ -19,6 +19,12 @@ __kernel void probe_arithmetic(__global const float* in, __global uint* out) {
     out[7] = as_uint(tiny * 0.5f);  // a denormal, or 0 where they are flushed (both are allowed, nothing here depends on it)
 }
 
+/// out[i] = philox of (i, 0, 0, 0) under (seed, 0): integers, so that what comes back is right or wrong to the bit.
+__kernel void probe_words(__global uint4* out, uint count, uint seed) {
+    const uint i = (uint)get_global_id(0);
+    if (i < count) out[i] = philox((uint4)(i, 0, 0, 0), (uint2)(seed, 0));
+}
+
 #define PROBE_RCP 0
 #define PROBE_DIVIDE 1
 #define PROBE_RSQRT 2

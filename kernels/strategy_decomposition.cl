@@ -54,25 +54,13 @@ static bool decomposition_blocks(float3 o, float3 d, float t_end, uint2 key, Wor
     return false;
 #else
     uint stack[CLUME_BVH_STACK];
+    BvhWalk w;
     const float3 inverse = ray_inverse(d);
-    int height = 0;
-    uint node = 0;
-    for (;;) {
-        COUNT(work, WORK_NODES, 1);
-        const float8 entry = bvh_test(nodes + node, o, inverse, 0.0f, t_end);
-        for (int i = 0; i < BVH_ARITY; ++i) {
-            const uint child = nodes[node].child[i];
-            if (child == BVH_NONE || !(((const float*)&entry)[i] < t_end)) continue;
-            if (child & BVH_LEAF) {
-                COUNT(work, WORK_GROUPS, 1);
-                group_decompose(child & ~BVH_LEAF, o, d, 0.0f, -CLUME_INFINITY, CLUME_INFINITY, key, &best, &primitive, SCENE);
-                if (primitive != CLUME_NO_PRIMITIVE) return true;
-            } else {
-                stack[height++] = child;
-            }
-        }
-        if (height == 0) return false;
-        node = stack[--height];
+    bvh_begin(&w, stack);
+    for (uint group; (group = bvh_next(&w, stack, o, inverse, 0.0f, t_end, work, nodes)) != BVH_NONE;) {
+        group_decompose(group, o, d, 0.0f, -CLUME_INFINITY, CLUME_INFINITY, key, &best, &primitive, SCENE);
+        if (primitive != CLUME_NO_PRIMITIVE) return true;
     }
+    return false;
 #endif
 }

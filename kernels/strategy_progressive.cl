@@ -2,8 +2,14 @@
 // `progressive`: null collisions under bounds that start low and are learned [Misso23, Progressive null-tracking for
 // volumetric rendering, SIGGRAPH 2023]. A density above its cell's bound raises it for the next pass (atomically; the bounds
 // of a pass are frozen, so that runs repeat) and is clamped to it in this one: consistent, not unbiased. What was clamped is
-// counted. Cells that no primitive meets are known to be empty; no other starts at 0.
+// counted. Cells that no primitive meets are known to be empty; no other starts at 0. Under bounds far too low a pass makes
+// hardly any look-ups, and would learn as slowly: in passes outside the image each cell crossed is looked into once.
 #include "strategy_delta.cl"
+
+/// A place in [begin, end) of cell `index` to look at while exploring; the word need not be used for nothing else.
+static float progressive_place(uint word, uint index, float begin, float end) {
+    return min_s(fma(uniform_s(word * (2u * index + 1u)), end - begin, begin), end);
+}
 
 /// The density sigma was found in a cell whose bound in this pass is `bound`: returns it clamped, reports and raises.
 static float progressive_clamp(float sigma, float bound, __global uint* raised, Flight* f) {
@@ -28,6 +34,11 @@ static int flight_progressive(float3 o, float3 d, float t_end, Flight* f, const 
         const CellLeaf leaf = leaves[w.entry.link - CELL_EMPTY_MAX];
         const uint index = CLUME_SCENE_BOUND ? 0u : w.entry.link - CELL_EMPTY_MAX;
         const float bound = learned[index], end = min_s(w.t_exit, w.t_end);
+        if (params->explore) {
+            const float3 p = along_s(o, d, progressive_place(bits.w, w.entry.link, w.t, end));
+            const float sigma = groups_density(leaf.first_group, leaf.group_count, p, SCENE);
+            if (sigma > bound) atomic_max(raised + index, as_uint(sigma));
+        }
         float t = w.t;
         for (;;) {
             const float depth = bound * (end - t);

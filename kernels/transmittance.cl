@@ -20,7 +20,8 @@ static ulong transmittance_limit(float e) {
     return ((ulong)CLUME_EXACT_DEPTH << 40) + convert_ulong_rtz(min_s(e, 128.0f - CLUME_EXACT_DEPTH) * 0x1p40f);
 }
 
-/// Estimate of the transmittance from o along d up to t_end; `limit` from transmittance_limit.
+/// Estimate of the transmittance from o along d up to t_end; `limit` from transmittance_limit. Without roulette, error < 1e-6 absolute
+/// against lines within the intersection's limit.
 static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit, Work* work, SCENE_ARGS) {
     ulong depth = 0;
 #if CLUME_MIXTURE && CLUME_ACCEL == ACCEL_CELLS

@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "runtime/check.h"
@@ -36,7 +37,15 @@ public:
     Buffer(const Queue& queue, const std::vector<T>& data, cl_mem_flags flags = CL_MEM_READ_ONLY)
         : Buffer(queue, std::span<const T>(data), flags) {}
     Buffer(Buffer&&) noexcept = default;
-    Buffer& operator=(Buffer&&) noexcept = default;
+    /// By exchange: what was held is released by a destructor, which a device that fails even then cannot make throw.
+    Buffer& operator=(Buffer&& other) noexcept {
+        Buffer old(std::move(other));
+        std::swap(queue_, old.queue_);
+        std::swap(label_, old.label_);
+        std::swap(size_, old.size_);
+        std::swap(memory_, old.memory_);
+        return *this;
+    }
 
     std::size_t size() const { return size_; }                   ///< elements
     std::size_t byte_size() const { return size_ * sizeof(T); }  ///< 0 for an empty buffer

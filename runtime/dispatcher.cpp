@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The threads around BatchPlan: one lock guards plan and report, workers run outside it. A worker without work waits
-// until all is done, since another's failure may give it some.
+// until all is done, since another's failure may give it some. A thread that hangs can't be ended: it is left behind, with
+// the state it shares, and comes back, if ever, to find that it was given up.
 #include "runtime/dispatcher.h"
 
 #include <chrono>
@@ -14,7 +15,12 @@
 
 namespace clume {
 
+Worker::Worker() : sign_of_life_(std::chrono::steady_clock::now()) {}
 Worker::~Worker() = default;
+
+double Worker::silent_s() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - sign_of_life_.load()).count();
+}
 
 namespace {
 
@@ -24,31 +30,41 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+/// Seconds as people write them: "60", "0.5".
+std::string plain(double seconds) {
+    std::string text = std::to_string(seconds);
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.back() == '.') text.pop_back();
+    return text;
+}
+
 class Dispatch {
 public:
-    Dispatch(const std::vector<std::unique_ptr<Worker>>& workers, const DispatchOptions& options)
-        : workers_(workers), options_(options), plan_(options, workers.size()), alive_(workers.size()) {
+    Dispatch(const Workers& workers, const DispatchOptions& options)
+        : workers_(workers), options_(options), plan_(options, workers.size()), held_(workers.size()), alive_(workers.size()) {
         for (const auto& worker : workers) report_.workers.emplace_back().name = worker->name();
         report_.units_of_item.resize(options.items);
         if (options.end > options.begin) report_.units_total = std::uint64_t(options.items) * (options.end - options.begin);
     }
 
-    DispatchReport run() {
+    /// `self` keeps this alive for threads left behind.
+    DispatchReport run(const std::shared_ptr<Dispatch>& self) {
         std::vector<std::thread> threads;
         try {
-            for (std::size_t w = 0; w < workers_.size(); ++w) threads.emplace_back([this, w] { serve(w); });
-            report_progress();
+            for (std::size_t w = 0; w < workers_.size(); ++w) threads.emplace_back([self, w] { self->serve(w); });
+            watch(true);
         } catch (...) {
             end_with(std::current_exception());
+            watch(false);
         }
-        for (std::thread& thread : threads) thread.join();
+        for (std::size_t w = 0; w < threads.size(); ++w) report_.workers[w].hung ? threads[w].detach() : threads[w].join();
         if (error_) std::rethrow_exception(error_);
         report_.elapsed_s = seconds_since(start_);
         report_.gaps = plan_.unredone();
         report_.stopped = stopping_ && report_.units_done < report_.units_total;
         report_.failed = !stopping_ && report_.units_done < report_.units_total;
         if (options_.progress) options_.progress(progress());
-        return std::move(report_);
+        return report_;
     }
 
 private:
@@ -61,17 +77,31 @@ private:
         changed_.notify_all();
     }
 
-    /// Calls `progress` from the caller's thread until nothing is left to do and every batch has come back.
-    void report_progress() {
+    /// On the caller's thread until nothing is left to do and every batch has come back: gives up workers that hang, and
+    /// calls `progress` if it is to `tell`.
+    void watch(bool tell) {
         std::unique_lock lock(mutex_);
         while (!(ended() && under_way_ == 0)) {
             changed_.wait_for(lock, std::chrono::milliseconds(200), [&] { return ended() && under_way_ == 0; });
-            if (!options_.progress || seconds_since(reported_) < 0.19) continue;
+            give_up_hung();
+            if (!tell || !options_.progress || seconds_since(reported_) < 0.19) continue;
             reported_ = Clock::now();
             const DispatchProgress state = progress();
             lock.unlock();
             options_.progress(state);
             lock.lock();
+        }
+    }
+
+    void give_up_hung() {
+        if (!(options_.hang_seconds > 0)) return;
+        for (std::size_t w = 0; w < workers_.size(); ++w) {
+            if (!held_[w] || workers_[w]->silent_s() < options_.hang_seconds) continue;
+            const Batch batch = *held_[w];
+            held_[w].reset();
+            --under_way_;
+            report_.workers[w].hung = true;
+            drop(w, batch, workers_[w]->doing() + " gave no sign of life for " + plain(options_.hang_seconds) + " s: it hangs");
         }
     }
 
@@ -94,6 +124,8 @@ private:
                 continue;
             }
             ++under_way_;
+            workers_[w]->alive();
+            held_[w] = batch;
             lock.unlock();
             std::string failure;
             std::exception_ptr other;
@@ -106,12 +138,27 @@ private:
             } catch (...) {
                 other = std::current_exception();
             }
-            const double seconds = seconds_since(start);
             lock.lock();
+            if (!held_[w]) return;  // given up: nobody waits for this thread, nothing it made counts
+            held_[w].reset();
+            if (failure.empty() && !other) {
+                lock.unlock();
+                try {
+                    workers_[w]->commit(*batch);
+                } catch (...) {
+                    other = std::current_exception();
+                }
+                lock.lock();
+            }
+            const double seconds = seconds_since(start);
             --under_way_;
             WorkerReport& own = report_.workers[w];
             own.busy_s += seconds;
-            if (other) std::rethrow_exception(other);
+            if (other) {
+                if (!error_) error_ = other;
+                stopping_ = true;
+                break;
+            }
             if (!failure.empty()) {
                 drop(w, *batch, failure);
                 return;
@@ -138,14 +185,15 @@ private:
         changed_.notify_all();
     }
 
-    const std::vector<std::unique_ptr<Worker>>& workers_;
-    const DispatchOptions& options_;
+    const Workers workers_;
+    const DispatchOptions options_;
     const Clock::time_point start_ = Clock::now();
     Clock::time_point reported_ = start_;
     std::mutex mutex_;
     std::condition_variable changed_;
     BatchPlan plan_;
     DispatchReport report_;
+    std::vector<std::optional<Batch>> held_;  ///< per worker: the batch in its run(), by which it can be given up
     std::exception_ptr error_;
     std::size_t alive_;
     std::size_t under_way_ = 0;
@@ -154,8 +202,9 @@ private:
 
 }  // namespace
 
-DispatchReport dispatch(const std::vector<std::unique_ptr<Worker>>& workers, const DispatchOptions& options) {
-    return Dispatch(workers, options).run();
+DispatchReport dispatch(const Workers& workers, const DispatchOptions& options) {
+    const auto state = std::make_shared<Dispatch>(workers, options);
+    return state->run(state);
 }
 
 }  // namespace clume

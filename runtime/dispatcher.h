@@ -4,6 +4,8 @@
 // units. Nothing is said about order: what a batch yields must add up the same in any.
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -22,13 +24,28 @@ struct Batch {
 /// What does batches, called from its own thread only, one batch at a time.
 class Worker {
 public:
+    Worker();
     virtual ~Worker();
     virtual std::string name() const = 0;
-    /// Blocks until done. All or nothing: results are committed at the end. Throws DeviceError if the device failed: then
-    /// the batch is given to another worker and this one gets no more. Any other exception ends the dispatch. Warm up
-    /// (compile) before dispatching, since batches are sized by how long they take.
+    /// Blocks until done, keeping the results to itself. Throws DeviceError if the device failed: then the batch is given to
+    /// another worker and this one gets no more. Any other exception ends the dispatch. Warm up (compile) before
+    /// dispatching, since batches are sized by how long they take. Calls alive() with every step that came to its end.
     virtual void run(const Batch& batch) = 0;
+    /// Adds what run() has made to the whole; host work only. Not called for a worker that was given up meanwhile.
+    virtual void commit(const Batch&) {}
+    /// What it does just now, such as "kernel render"; asked from another thread when it gives no sign of life.
+    virtual std::string doing() const { return "a batch"; }
+
+    /// A sign of life.
+    void alive() { sign_of_life_.store(std::chrono::steady_clock::now()); }
+    double silent_s() const;  ///< since the last one
+
+private:
+    std::atomic<std::chrono::steady_clock::time_point> sign_of_life_;
 };
+
+/// Shared, because a worker that hangs outlives its dispatch together with its thread.
+using Workers = std::vector<std::shared_ptr<Worker>>;
 
 struct DispatchProgress {
     std::uint64_t units_done = 0, units_total = 0;  ///< over all items
@@ -41,6 +58,7 @@ struct DispatchOptions {
     std::uint32_t begin = 0, end = 0;      ///< units of every item
     std::uint32_t fixed_chunk = 0;         ///< units per batch; 0: by measurement
     double target_seconds = 0.15;          ///< per batch; well under a display driver's watchdog
+    double hang_seconds = 0;               ///< a worker silent for so long is given up; 0: none ever is
     std::function<bool()> stop;            ///< asked before each batch, one thread at a time; true: start no more
     std::function<void(const DispatchProgress&)> progress;  ///< called by dispatch's caller's thread, every 0.2 s and at the end
 };
@@ -51,6 +69,7 @@ struct WorkerReport {
     std::uint64_t batches = 0;
     double busy_s = 0;     ///< inside run(), failed batches included
     bool dropped = false;
+    bool hung = false;     ///< dropped because it gave no sign of life; its thread is left behind
     std::string error;     ///< why it was dropped
 };
 
@@ -66,7 +85,7 @@ struct DispatchReport {
 };
 
 /// Runs until all is done, `stop` says so, or no worker is left. What isn't a DeviceError (from a worker, `stop` or
-/// `progress`) is thrown again here once every thread has ended its batch.
-DispatchReport dispatch(const std::vector<std::unique_ptr<Worker>>& workers, const DispatchOptions& options);
+/// `progress`) is thrown again here once every thread has ended its batch or was given up.
+DispatchReport dispatch(const Workers& workers, const DispatchOptions& options);
 
 }  // namespace clume

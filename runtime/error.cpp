@@ -82,6 +82,7 @@ std::string error_code_name(int code) {
 void throw_device_error(const cl::Error& error, const std::string& device, const std::string& detail) {
     std::string message = std::string(error.what()) + ": " + error_code_name(error.err()) + " on " + device;
     if (!detail.empty()) message += " (" + detail + ")";
+    if (error.err() == CL_MEM_OBJECT_ALLOCATION_FAILURE || error.err() == CL_OUT_OF_HOST_MEMORY) throw DeviceMemoryError(message);
     throw DeviceError(message);
 }
 

@@ -17,6 +17,11 @@ struct DeviceError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+/// The device had no room for a buffer: less at a time may go.
+struct DeviceMemoryError : DeviceError {
+    using DeviceError::DeviceError;
+};
+
 /// A program that didn't build. The message holds the log and the options.
 struct BuildError : DeviceError {
     BuildError(const std::string& device, std::string options_used, std::string build_log);
@@ -27,7 +32,8 @@ struct BuildError : DeviceError {
 /// "CL_OUT_OF_RESOURCES" for −5; "OpenCL error −123" for a code without a name.
 std::string error_code_name(int code);
 
-/// Throws DeviceError: "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES on DEVICE", `detail` added in brackets if not empty.
+/// Throws DeviceError: "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES on DEVICE", `detail` added in brackets if not empty; a
+/// DeviceMemoryError if the code says that memory was short (drivers may notice only when a command first uses a buffer).
 [[noreturn]] void throw_device_error(const cl::Error& error, const std::string& device, const std::string& detail = {});
 
 }  // namespace clume

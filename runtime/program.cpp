@@ -24,6 +24,12 @@ std::string raw_log(const cl::Program& program, const cl::Device& device) {
     }
 }
 
+/// clBuildProgram alone: the bindings' build() asks for the log when it fails, and reports that call if there is none.
+cl_int build(const cl::Program& program, const cl::Device& device, const std::string& options) {
+    const cl_device_id id = device();
+    return clBuildProgram(program(), 1, &id, options.c_str(), nullptr, nullptr);
+}
+
 /// A driver may refuse a binary it once made; that's a miss.
 std::optional<cl::Program> build_from_cache(const Queue& queue, const std::string& key, const std::string& options) {
     const std::optional<Binary> binary = load_binary(program_cache_folder(), key);
@@ -31,7 +37,7 @@ std::optional<cl::Program> build_from_cache(const Queue& queue, const std::strin
     try {
         const std::vector<cl::Device> devices{queue.info().device};
         cl::Program program(queue.context(), devices, cl::Program::Binaries{*binary});
-        program.build(devices, options.c_str());
+        if (build(program, queue.info().device, options) != CL_SUCCESS) return std::nullopt;
         return program;
     } catch (const cl::Error&) {
         return std::nullopt;
@@ -80,12 +86,9 @@ cl::Program build_source(const Queue& queue, const std::string& source, const Pr
         if (auto program = build_from_cache(queue, key, text)) return *program;
     }
     cl::Program program = checked(queue.label(), [&] { return cl::Program(queue.context(), source, false); });
-    try {
-        program.build({queue.info().device}, text.c_str());
-    } catch (const cl::Error& error) {
-        if (error.err() != CL_BUILD_PROGRAM_FAILURE) throw_device_error(error, queue.label(), "options " + text);
-        throw BuildError(queue.label(), text, raw_log(program, queue.info().device));
-    }
+    const cl_int code = build(program, queue.info().device, text);
+    if (code == CL_BUILD_PROGRAM_FAILURE) throw BuildError(queue.label(), text, raw_log(program, queue.info().device));
+    if (code != CL_SUCCESS) throw_device_error(cl::Error(code, "clBuildProgram"), queue.label(), "options " + text);
     if (cached) store_in_cache(program, key);
     return program;
 }

@@ -63,9 +63,11 @@ cl::Buffer Queue::allocate(std::size_t byte_size, cl_mem_flags flags) const {
     try {
         return cl::Buffer(context_, flags, byte_size);
     } catch (const cl::Error& error) {
-        throw_device_error(error, label_,
-                           std::to_string(byte_size) + " bytes asked for, the device gives at most " +
-                               std::to_string(info_.max_allocation) + " at once of " + std::to_string(info_.global_memory));
+        const std::string detail = std::to_string(byte_size) + " bytes asked for, the device gives at most " + std::to_string(info_.max_allocation) +
+                                   " at once of " + std::to_string(info_.global_memory);
+        if (error.err() == CL_OUT_OF_RESOURCES || error.err() == CL_INVALID_BUFFER_SIZE)  // of an allocation, these mean memory
+            throw DeviceMemoryError(std::string(error.what()) + ": " + error_code_name(error.err()) + " on " + label_ + " (" + detail + ")");
+        throw_device_error(error, label_, detail);
     }
 }
 

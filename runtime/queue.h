@@ -30,7 +30,7 @@ public:
     void flush();   ///< starts what is enqueued
     void finish();  ///< waits for it; throws DeviceError if a command failed
 
-    /// Device memory; the DeviceError of a failure tells bytes asked for and the most the device gives.
+    /// Device memory; the DeviceMemoryError of a failure tells bytes asked for and the most the device gives.
     cl::Buffer allocate(std::size_t byte_size, cl_mem_flags flags) const;
 
 private:

@@ -7,6 +7,7 @@
 #include <limits>
 #include <queue>
 
+#include "src/memory_budget.h"
 #include "src/parallel.h"
 
 namespace clume {
@@ -245,6 +246,7 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     };
     visit([&](std::uint32_t, std::size_t root) { ++offset[root + 1]; });
     for (std::size_t r = 0; r < roots; ++r) offset[r + 1] += offset[r];
+    require_memory("cells", {{"lists of the root cells", offset[roots] * sizeof(std::uint32_t) + roots * (sizeof(std::uint64_t) + sizeof(Subtree))}});
     std::vector<std::uint32_t> candidates(offset[roots]);
     {
         std::vector<std::uint64_t> cursor(offset.begin(), offset.end() - 1);
@@ -258,6 +260,7 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     const Refiner refiner{ellipsoids, cost, std::clamp(2.0 * spare, 1.5, 8.0), max_levels, 2.5 * choice.typical_cost, options.control};
     std::vector<Subtree> subtrees(roots);
     parallel_chunks(roots, 64, [&](std::size_t begin, std::size_t end) {
+        if (begin % 1024 == 0) require_memory("cells", {{"to split them further", (end - begin) * 4096}});  // how far shows only on the way
         for (std::size_t r = begin; r < end; ++r) {
             const glm::dvec3 at(r % cells.roots.x, r / cells.roots.x % cells.roots.y, r / cells.roots.x / cells.roots.y);
             const Box box{cells.origin + at * cells.root_size, cells.origin + (at + 1.0) * cells.root_size};
@@ -267,7 +270,15 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     });
 
     // One table: roots, then all blocks; leaves in the order of their roots.
-    for (const auto& s : subtrees) cells.levels = std::max(cells.levels, s.depth);
+    std::size_t entries = roots, leaf_count = 0;
+    for (const auto& s : subtrees) {
+        cells.levels = std::max(cells.levels, s.depth);
+        entries += s.blocks.size();
+        leaf_count += s.leaves.size();
+    }
+    require_memory("cells", {{"table", entries * sizeof(std::uint32_t)}, {"leaves", leaf_count * sizeof(Cells::Leaf)}});
+    cells.table.reserve(entries);
+    cells.leaves.reserve(leaf_count);
     cells.table.assign(roots, 1);
     const auto place = [&](std::uint32_t entry, std::size_t first_block, std::size_t first_leaf) -> std::uint32_t {
         if (entry & CELL_INNER) return CELL_INNER | static_cast<std::uint32_t>(roots + 8 * ((entry & ~CELL_INNER) + first_block));

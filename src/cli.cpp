@@ -16,6 +16,7 @@
 
 #include "src/bake.h"
 #include "src/error.h"
+#include "src/memory_budget.h"
 #include "src/scene_schema.h"
 #include "src/voxel_writer.h"
 
@@ -42,16 +43,15 @@ constexpr std::array key_flags{
     KeyFlag{"--majorant-grid", "render.majorant_grid", "N", "cells along the longest axis of a grid of bounds", true},
 };
 
-constexpr const char* overview =
-    "clume renders mixtures of ellipsoids (smoke, fire, clouds) by path tracing, on any OpenCL device.\n";
+constexpr const char* overview = "clume renders mixtures of ellipsoids (smoke, fire, clouds) by path tracing, on any OpenCL device.\n";
 constexpr const char* exit_codes =
-    "Exit codes: 0 done, 1 render failed, 2 wrong command line, 3 wrong scene or asset, 4 no such device, 130 interrupted.";
+    "Exit codes: 0 done, 1 render failed, 2 wrong command line, 3 wrong scene or asset, 4 no such device or none left, 130 interrupted.";
 
 /// What the strings of `render` are parsed into before they are checked.
 struct RenderTexts {
-    std::string scene, output, sample_range, crop, stats_json;
+    std::string scene, output, sample_range, crop, stats_json, memory_limit;
     std::vector<std::string> definitions, devices;
-    std::optional<double> time_limit_s;
+    std::optional<double> time_limit_s, kernel_timeout_s;
     std::optional<int> cpu_split;
 };
 
@@ -165,6 +165,7 @@ RenderCommand check_render(RenderTexts texts, RenderCommand command) {
     if (command.stats_json && (*command.stats_json == command.exr || *command.stats_json == command.png()))
         throw UsageError("--stats-json " + texts.stats_json + ": is the name of the image");
 
+    if (!texts.memory_limit.empty()) command.memory_limit = parse_byte_size("--memory-limit", texts.memory_limit);
     RenderOptions& options = command.options;
     std::array<std::uint32_t, 2> range{};
     if (!texts.sample_range.empty()) {
@@ -182,6 +183,8 @@ RenderCommand check_render(RenderTexts texts, RenderCommand command) {
     if (texts.time_limit_s && !(*texts.time_limit_s > 0 && std::isfinite(*texts.time_limit_s)))
         throw UsageError("--time-limit: must be a positive number of seconds");
     options.time_limit_s = texts.time_limit_s;
+    options.kernel_timeout_s = texts.kernel_timeout_s.value_or(options.kernel_timeout_s);
+    if (!(options.kernel_timeout_s >= 0 && options.kernel_timeout_s <= 1e6)) throw UsageError("--kernel-timeout: must be 0 (never) to 1e6 seconds");
     if (texts.cpu_split && *texts.cpu_split < 1) throw UsageError("--cpu-split: must be at least 1");
     options.cpu_split = texts.cpu_split.value_or(0);
     options.devices = texts.devices;
@@ -255,8 +258,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     render->allow_extras();
     render->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     render->add_option("SCENE", texts.scene, "scene file (JSON, docs/scene.md)")->type_name("");
-    render->add_option("-o,--output", texts.output, "image to write; default: the scene's name, in the current folder")
-        ->type_name("OUT.exr");
+    render->add_option("-o,--output", texts.output, "image to write; default: the scene's name, in the current folder")->type_name("OUT.exr");
     std::map<const CLI::Option*, const char*> keys;
     for (const KeyFlag& flag : key_flags) {
         CLI::Option* option = render->add_option(flag.flag)->description(help_of(flag))->type_name(flag.value);
@@ -265,6 +267,8 @@ Command parse_command_line(int argc, const char* const* argv) {
     render->add_option("--sample-range", texts.sample_range, "only samples A to B - 1 of each pixel")->type_name("A:B");
     render->add_option("--crop", texts.crop, "only this part of the film, half-open")->type_name("x0,y0,x1,y1");
     render->add_option("--time-limit", texts.time_limit_s, "stop after this long and write what is done")->type_name("SECONDS");
+    render->add_option("--kernel-timeout", texts.kernel_timeout_s, "a device silent for so long hangs and is given up; default 120; 0: never")->type_name("SECONDS");
+    render->add_option("--memory-limit", texts.memory_limit, "most memory to use, such as 512M or 2G; default: what is free")->type_name("SIZE");
     render->add_option("--device", texts.devices, "id, part of a name, cpu, gpu or all; several with commas or repeated")
         ->type_name("DEVICE")
         ->take_all()
@@ -288,7 +292,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     compare->add_option("-o,--output", compare_texts.output, "folder to write; default: the scene's name and _compare")->type_name("FOLDER");
     compare->add_option("--strategies", compare_texts.strategies,
                         "pairs strategy/estimator with commas, such as delta/ratio,march/march; a strategy alone: with every estimator; delta:scene, "
-                        "delta:grid, delta:tree: with that bound; default: all that fit")
+                        "delta:grid, delta:tree: with that bound; default: all")
         ->type_name("LIST");
     compare->add_option("--time", compare_texts.time_s, "equal time: seconds for each pair and seed")->type_name("SECONDS");
     compare->add_option("--spp", compare_texts.spp, "1, 2, 4 ... N samples per pixel, or the counts given with commas; default: render.spp")
@@ -333,6 +337,19 @@ Command parse_command_line(int argc, const char* const* argv) {
                                        ->take_all()
                                        ->allow_extra_args(false);
     bake->add_flag("--quiet", bake_quiet, "no progress on stderr");
+    StressCommand stress_command;
+    std::string stress_json, stress_report;
+    CLI::App* stress = app.add_subcommand("stress", "hold the kernels' arithmetic against 256 bits; prints a table")->allow_extras();
+    stress->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    stress->add_option("--device", stress_command.devices, "id, part of a name, cpu, gpu or all; several with commas or repeated")
+        ->type_name("DEVICE")
+        ->take_all()
+        ->allow_extra_args(false);
+    stress->add_flag("--quick", stress_command.quick, "fewer cases: seconds");
+    stress->add_option("--json", stress_json, "write every figure; - is stdout (the table then goes to stderr)")->type_name("FILE");
+    stress->add_option("--report", stress_report, "write a page with plots into this folder; where it holds stability.md, remake that page's tables and plots")
+        ->type_name("DIR");
+    stress->add_flag("--quiet", stress_command.quiet, "no progress on stderr");
     app.add_subcommand("bench", "measure speed; see clume bench --help");
 
     try {
@@ -347,7 +364,7 @@ Command parse_command_line(int argc, const char* const* argv) {
         throw UsageError(text);
     }
     refuse_leftovers(app, nullptr);
-    for (const CLI::App* sub : {render, compare, devices, info, bake})
+    for (const CLI::App* sub : {render, compare, devices, info, bake, stress})
         if (sub->parsed()) refuse_leftovers(*sub, &app);
     if (app.get_subcommands().size() > 1) throw UsageError("one subcommand at a time");
 
@@ -372,7 +389,12 @@ Command parse_command_line(int argc, const char* const* argv) {
         out.quiet = bake_quiet;
         return out;
     }
-    throw UsageError("which subcommand? render, compare, devices, info, bake or bench; see clume --help");
+    if (stress->parsed()) {
+        if (!stress_json.empty()) stress_command.json = stress_json;
+        if (!stress_report.empty()) stress_command.report = stress_report;
+        return stress_command;
+    }
+    throw UsageError("which subcommand? render, compare, devices, info, bake, stress or bench; see clume --help");
 }
 
 }  // namespace clume

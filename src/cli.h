@@ -3,6 +3,7 @@
 // Flags that stand for a scene key become overrides, in the order typed, so that the last one wins whichever way it is said.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -25,6 +26,7 @@ struct RenderCommand {
     double exposure_stops = 0;
     bool explain = false, quiet = false;
     std::optional<std::filesystem::path> stats_json;  ///< "-": stdout
+    std::optional<std::uint64_t> memory_limit;        ///< bytes
 
     std::filesystem::path png() const { return std::filesystem::path(exr).replace_extension(".png"); }
 };
@@ -52,12 +54,20 @@ struct BakeCommand {
     bool quiet = false;
 };
 
+struct StressCommand {
+    std::vector<std::string> devices;
+    bool quick = false;
+    std::optional<std::filesystem::path> json;    ///< "-": stdout
+    std::optional<std::filesystem::path> report;  ///< folder
+    bool quiet = false;
+};
+
 /// --help and --version: `text` goes to stdout.
 struct PrintCommand {
     std::string text;
 };
 
-using Command = std::variant<PrintCommand, RenderCommand, CompareCommand, DevicesCommand, InfoCommand, BakeCommand>;
+using Command = std::variant<PrintCommand, RenderCommand, CompareCommand, DevicesCommand, InfoCommand, BakeCommand, StressCommand>;
 
 /// Throws UsageError with one line that names the nearest right flag or subcommand. `bench` is the caller's: its arguments
 /// are not parsed here.

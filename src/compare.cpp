@@ -101,19 +101,16 @@ void Comparer::describe() {
 
 void Comparer::prepare() {
     std::vector<MethodPair> pairs;
-    const std::vector<MethodPair> all = all_pairs(scene_, out_.estimator_matters);
     for (const MethodPair& wanted : options_.pairs) {
         if (!wanted.estimator.empty()) pairs.push_back(wanted);
         else
-            for (MethodPair p : all)
-                if (p.strategy == wanted.strategy) p.bound = wanted.bound, pairs.push_back(p);
+            for (const MethodPair& p : pairs_of(wanted.strategy, wanted.bound, out_.estimator_matters)) pairs.push_back(p);
     }
     const bool asked_for = !options_.pairs.empty();
-    if (!asked_for) pairs = all;
+    if (!asked_for) pairs = all_pairs(scene_, out_.estimator_matters);
     std::vector<MethodPair> once;
     for (const MethodPair& p : pairs)
         if (std::find(once.begin(), once.end(), p) == once.end()) once.push_back(p);
-    if (once.empty()) throw UsageError("--strategies: none of them can handle all media of " + scene_.path);
     std::string failures;
     for (const MethodPair& pair : once) {
         if (plan_.stopped()) return;

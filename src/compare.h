@@ -19,7 +19,7 @@
 namespace clume {
 
 struct CompareOptions {
-    std::vector<MethodPair> pairs;      ///< empty: all that fit; an empty estimator stands for every one that fits
+    std::vector<MethodPair> pairs;      ///< empty: all that differ in the scene; an empty estimator stands for every one
     std::optional<double> time_s;       ///< seconds that each pair gets per seed; else sample counts
     std::vector<std::uint32_t> spp;     ///< rising; empty: 1, 2, 4 … render.spp
     std::uint32_t seeds = 8;            ///< render.seed and those after it

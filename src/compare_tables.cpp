@@ -8,6 +8,8 @@
 #include <cmath>
 #include <map>
 
+#include "src/json_text.h"
+
 namespace clume {
 namespace {
 
@@ -43,15 +45,7 @@ void put(Writer& out, const char* key, double value) {
     else out.Null();
 }
 void put(Writer& out, const char* key, const std::string& value) {
-    // A driver may call its device anything: what is not UTF-8 gets '?'.
-    rapidjson::StringStream source(value.c_str());
-    rapidjson::StringBuffer checked;
-    bool valid = true;
-    while (valid && source.Peek() != '\0') valid = rapidjson::UTF8<>::Validate(source, checked);
-    std::string text = value;
-    if (!valid)
-        for (char& c : text)
-            if (static_cast<unsigned char>(c) >= 0x80) c = '?';
+    const std::string text = json_text(value);
     if (key) out.Key(key);
     out.String(text.c_str(), static_cast<rapidjson::SizeType>(text.size()));
 }

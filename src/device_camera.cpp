@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "src/device_values.h"
+
 namespace clume {
 namespace {
 
@@ -24,10 +26,6 @@ struct Frame {
         cy = 0.5 * scene.film.height;
     }
 };
-
-device::float4 pack(const glm::dvec3& v) {
-    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), 0};
-}
 
 /// Marks rectangles by their corners; the prefix sum tells which pixels lie in any.
 class Coverage {

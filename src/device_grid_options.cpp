@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "src/device_grids.h"
+#include "src/strategies.h"
 
 namespace clume {
 
@@ -10,6 +11,7 @@ void define_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out
     if (scene.grids.empty()) return;
     const auto define = [&](const char* name, std::size_t value) { out.defines.emplace_back(name, std::to_string(value)); };
     define("CLUME_GRIDS", scene.grids.size());
+    define("CLUME_GRID_STRATEGY", static_cast<std::size_t>(find_strategy(out.strategy)->in_grids));
     define("CLUME_GRID_LEVELS", traits.levels);
     define("CLUME_GRID_KINDS", traits.kinds);
     define("CLUME_GRID_BOUNDS", traits.tables);

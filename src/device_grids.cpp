@@ -7,7 +7,9 @@
 #include <fmt/format.h>
 
 #include "src/cells.h"
+#include "src/device_values.h"
 #include "src/error.h"
+#include "src/memory_budget.h"
 #include "src/parallel.h"
 
 namespace clume {
@@ -182,7 +184,7 @@ std::vector<std::uint32_t> make_table(const Layout& l, const glm::uvec3& roots, 
 /// A table of bounds of its own: cubes from the support's corner on, each with the largest sample that its density depends on.
 void add_bounds(const Layout& l, double per_root, int along, std::size_t first_value, device::GridInfo& info, DeviceScene& out) {
     const glm::dvec3 size = l.support.hi - l.support.lo;
-    const double edge = std::max({size.x, size.y, size.z}) / along;  // in cells
+    const double edge = largest(size) / along;  // in cells
     info.bounds_scale = static_cast<float>(per_root / edge);
     const double scale = static_cast<double>(info.bounds_scale);
     const glm::dvec3 corner(info.lower.x, info.lower.y, info.lower.z);
@@ -190,7 +192,7 @@ void add_bounds(const Layout& l, double per_root, int along, std::size_t first_v
     if (static_cast<double>(counts.x) * counts.y * counts.z > 0x1p28) throw SceneError("render.majorant_grid needs more than 2^28 cells");
     std::vector<float> most(static_cast<std::size_t>(counts.x) * counts.y * counts.z, 0);
     // Bounds' cells that a sample at table position p [cells] reaches, a margin for the device's rounding included.
-    const double reach = l.interpolation == Interpolation::nearest ? 0.5 : 1, margin = 0.01 + 0x1p-20 * std::max({size.x, size.y, size.z});
+    const double reach = l.interpolation == Interpolation::nearest ? 0.5 : 1, margin = 0.01 + 0x1p-20 * largest(size);
     const auto cell = [&](double p, int k) { return static_cast<int>(std::clamp(std::floor((p / per_root - corner[k]) * scale), 0.0, static_cast<double>(counts[k] - 1))); };
     for (std::size_t i = 0; i < l.stored.size(); ++i) {
         int lo[3][GRID_ROW], hi[3][GRID_ROW];
@@ -283,6 +285,7 @@ void add_grid(const Layout& l, std::uint32_t levels, int bounds, DeviceScene& ou
     info.first_brick = static_cast<device::uint>(first_value / GRID_BRICK_VALUES);
     info.first_entry = static_cast<device::uint>(first_entry);
     if (first_value / GRID_BRICK_VALUES + l.stored.size() > 0x7fffff00u) throw SceneError("voxel grids of more than 2^31 bricks");
+    require_memory("voxel grid", {{"values on the host", 4 * (first_value + GRID_BRICK_VALUES * l.stored.size())}});
     out.grid_values.resize(first_value + GRID_BRICK_VALUES * l.stored.size());
     const std::vector<std::uint32_t> table = make_table(l, roots, levels);
     out.grid_cells.resize(first_entry + table.size());
@@ -352,7 +355,7 @@ GridTraits pack_grids(const Scene& scene, DeviceScene& out) {
     }
     for (std::size_t i = 0; i < layouts.size(); ++i) {
         const glm::dvec3 size = layouts[i].support.hi - layouts[i].support.lo;
-        const double along = std::max({size.x, size.y, size.z}) / (kBrick * std::max(1, edges[i]));
+        const double along = largest(size) / (kBrick * std::max(1, edges[i]));
         const int bounds = !traits.tables ? 0 : r.majorant_grid.value_or(static_cast<int>(std::ceil(along)));
         add_grid(layouts[i], traits.levels, i < scene.grids.size() ? bounds : 0, out);
         if (out.strategy == "progressive" && i < scene.grids.size()) {
@@ -370,12 +373,12 @@ GridTraits pack_grids(const Scene& scene, DeviceScene& out) {
         if (!m.emission_grid) continue;
         traits.emission_grids = true;
         info.emission_grid = static_cast<device::uint>(next);
-        info.emission = {static_cast<float>(m.emission.x), static_cast<float>(m.emission.y), static_cast<float>(m.emission.z), 0};
+        info.emission = pack(m.emission);
         double longest = 0;
         const auto corners = grid_corners(*m.emission_grid, m.interpolation);
         for (const auto& a : corners)
             for (const auto& b : corners) longest = std::max(longest, glm::length(a - b));
-        traits.brightest = std::max(traits.brightest, std::max({m.emission.x, m.emission.y, m.emission.z}) * static_cast<double>(out.grids[next].bound) * longest * out.normalization.scale);
+        traits.brightest = std::max(traits.brightest, largest(m.emission) * static_cast<double>(out.grids[next].bound) * longest * out.normalization.scale);
         ++next;
     }
     return traits;

@@ -6,15 +6,12 @@
 #include <numbers>
 
 #include "src/alias_table.h"
+#include "src/device_values.h"
 
 namespace clume {
 namespace {
 
 using std::numbers::pi;
-
-device::float4 pack(const glm::dvec3& v, double w = 0) {
-    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
-}
 
 device::uint kind_bit(LightKind kind) {
     switch (kind) {
@@ -28,9 +25,6 @@ device::uint kind_bit(LightKind kind) {
     }
     return LIGHT_RECTANGLE;
 }
-
-double largest(const glm::dvec3& v) { return std::max({v.x, v.y, v.z}); }
-bool is_grey(const glm::dvec3& v) { return v.x == v.y && v.y == v.z; }
 
 /// Texels and alias table (Vose) of one environment; returns π × mean radiance, the irradiance it gives.
 double add_environment(const Light& light, DeviceScene& out, device::LightInfo& info, LightMasks& masks) {

@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include "src/alias_table.h"
+#include "src/device_values.h"
 #include "src/error.h"
+#include "src/memory_budget.h"
 #include "src/parallel.h"
 
 namespace clume {
 namespace {
-
-float as_float(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 /// Device groups out of lists of primitives: each list is cut by medium, then into sixteens.
 class GroupWriter {
@@ -29,6 +29,7 @@ public:
     /// Makes room for more groups; the index of the first.
     std::size_t extend(std::size_t groups) {
         const std::size_t first = out_.group_medium.size();
+        require_memory("groups of primitives", {{"groups for the device", (first + groups) * (4 * CLUME_GROUP_FLOATS + sizeof(device::uint))}});
         out_.group_medium.resize(first + groups);
         out_.groups.resize((first + groups) * CLUME_GROUP_FLOATS);
         return first;
@@ -47,11 +48,7 @@ public:
                     for (int r = 0; r < CLUME_GROUP_ROWS; ++r) put(r, pad[r]);
                     continue;
                 }
-                const Ellipsoid& e = ellipsoids_[list[i + lane]];
-                for (int k = 0; k < 3; ++k) put(CLUME_ROW_MU + k, static_cast<float>(e.center[k]));
-                for (int k = 0; k < 6; ++k) put(CLUME_ROW_W + k, static_cast<float>(e.w[k]));
-                put(CLUME_ROW_SIGMA, static_cast<float>(e.sigma));
-                put(CLUME_ROW_ID, as_float(list[i + lane]));
+                pack_lane(ellipsoids_[list[i + lane]], list[i + lane], row + lane, CLUME_GROUP_SIZE);
             }
             i += n;
         }
@@ -82,6 +79,12 @@ void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& elli
         out[i] = {slots[i].threshold, leaf.primitives[i], leaf.primitives[slots[i].other], scale(i) | scale(slots[i].other) << 16};
 }
 
+}  // namespace
+
+device::uint family_bit(KernelFamily k) {
+    return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
+}
+
 void pack_primitives(DeviceScene& out) {
     out.primitives.resize(out.ellipsoids.size());
     parallel_chunks(out.ellipsoids.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -99,10 +102,12 @@ void pack_primitives(DeviceScene& out) {
     });
 }
 
-}  // namespace
-
-device::uint family_bit(KernelFamily k) {
-    return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
+void pack_lane(const Ellipsoid& e, std::uint32_t id, float* lane, std::size_t stride) {
+    const auto put = [&](int row, float v) { lane[static_cast<std::size_t>(row) * stride] = v; };
+    for (int k = 0; k < 3; ++k) put(CLUME_ROW_MU + k, static_cast<float>(e.center[k]));
+    for (int k = 0; k < 6; ++k) put(CLUME_ROW_W + k, static_cast<float>(e.w[k]));
+    put(CLUME_ROW_SIGMA, static_cast<float>(e.sigma));
+    put(CLUME_ROW_ID, as_float(id));
 }
 
 void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out) {
@@ -126,6 +131,7 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
             references += leaf.primitives.size();
         }
     }
+    require_memory("cells", {{"table for the device", cells.table.size() * sizeof(device::CellEntry)}, {"references", references * sizeof(device::Reference)}, {"primitives", out.ellipsoids.size() * sizeof(device::Primitive)}});
     out.cells.resize(cells.table.size());
     for (std::size_t i = 0; i < cells.table.size(); ++i) {
         const device::uint link = cells.table[i];
@@ -145,7 +151,7 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
     });
     if (with_references) pack_primitives(out);
     device::RenderParams& p = out.params;
-    p.cells_origin = {static_cast<float>(cells.origin.x), static_cast<float>(cells.origin.y), static_cast<float>(cells.origin.z), static_cast<float>(1.0 / cells.root_size)};
+    p.cells_origin = pack(cells.origin, 1.0 / cells.root_size);
     p.cells_x = cells.roots.x;
     p.cells_y = cells.roots.y;
     p.cells_z = cells.roots.z;

@@ -20,28 +20,45 @@ struct Tile {
     std::uint32_t first = 0, count = 0;
 };
 
+/// A device short of memory for a batch takes it in pieces; all pieces count, or none.
 class DeviceRenderer : public Worker {
 public:
     /// Builds the program (width 0: the device's own; not `optimised`: sooner), uploads the scene, warms up. Throws DeviceError.
     DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene, const std::vector<device::uint>& pixels, const std::vector<Tile>& tiles,
                    int vector_width, bool optimised = true);
 
-    /// Batches from now on use `seed` and add to `film`, which must outlive them. Throws DeviceError.
+    /// Most bytes that one batch takes on the device and, as much of it as comes back, on the host.
+    static std::uint64_t batch_bytes(const DeviceInfo& info, const std::vector<Tile>& tiles);
+
+    /// Batches from now on use `seed` and add to `film`, which must outlive them.
     void aim(FilmSums& film, std::uint64_t seed);
 
-    /// Bounds of `progressive` for the batches from now on, one per leaf; and the highest densities found above them so far.
-    void set_learned(std::span<const float> bounds) { scene_.learned.upload(bounds); }
-    std::vector<float> raised() const;
+    /// Bounds of `progressive` for the batches from now on, one per leaf, and whether rays look into every cell that they cross;
+    /// and the highest densities that batches have found above those bounds since.
+    void set_learned(std::span<const float> bounds, bool explore);
+    std::span<const float> raised() const { return raised_; }
+
+    /// Work-items that fitted into the device's memory when a batch did not; 0 if all did.
+    std::size_t short_of_memory() const { return short_of_memory_; }
 
     std::string name() const override { return queue_.label(); }
+    std::string doing() const override { return "kernel render"; }
     void run(const Batch& batch) override;
+    void commit(const Batch& batch) override;
 
 private:
-    /// Renders samples [begin, end) of a tile into `host_sums_`; returns the splits used.
-    std::size_t render(const Tile& tile, std::uint32_t begin, std::uint32_t end);
+    /// Sums of the active pixels [first, first + count).
+    struct Piece {
+        std::size_t first, count, splits;
+        std::vector<std::uint64_t> sums;
+    };
+    /// Renders samples [begin, end) of the pixels.
+    Piece render(std::size_t first, std::size_t count, std::uint32_t begin, std::uint32_t end);
+    /// Uploads what aim() and set_learned() have left to do: all calls that may fail or hang are made inside run().
+    void upload_changes();
 
     Queue queue_;
-    const std::vector<Tile>& tiles_;
+    const std::vector<Tile> tiles_;
     FilmSums* film_ = nullptr;
     device::RenderParams params_;
     SceneBuffers scene_;
@@ -50,8 +67,14 @@ private:
     Buffer<std::uint64_t> sums_;
     Buffer<device::uint> unfinished_;
     cl::Kernel kernel_;
-    std::vector<std::uint64_t> host_sums_;
-    std::size_t wanted_items_;  ///< work-items that keep the device busy
+    std::vector<Piece> pieces_;              ///< of the batch last run
+    std::vector<float> learned_;             ///< to be uploaded
+    std::vector<device::uint> found_;        ///< raised bounds after the batch last run
+    std::vector<float> raised_;
+    bool aimed_ = false;                     ///< params_ are on the device
+    std::size_t wanted_items_;               ///< work-items that keep the device busy
+    std::size_t most_items_ = SIZE_MAX;      ///< work-items that fit its memory, as far as known
+    std::size_t short_of_memory_ = 0;
 };
 
 /// Width of the vectors of primitives on a device: its own native width, unless told otherwise.

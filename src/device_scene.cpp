@@ -2,7 +2,6 @@
 #include "src/device_scene.h"
 
 #include <algorithm>
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <fmt/format.h>
@@ -14,18 +13,13 @@
 #include "src/device_grids.h"
 #include "src/device_lights.h"
 #include "src/device_mixture.h"
+#include "src/device_values.h"
 #include "src/error.h"
+#include "src/memory_budget.h"
+#include "src/strategies.h"
 
 namespace clume {
 namespace {
-
-device::float4 pack(const glm::dvec3& v, double w = 0) {
-    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)};
-}
-
-bool is_grey(const glm::dvec3& v) { return v.x == v.y && v.y == v.z; }
-
-float as_float(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 
 template <class T>
 std::string hash_of(const std::vector<T>& v) {
@@ -61,7 +55,7 @@ MediaTraits pack_media(const Scene& scene, DeviceScene& out) {
             uniform_emission = uniform_emission && p.emission == first->emission;
             t.uniform_g = t.uniform_g && g == first_g;
             t.grey = t.grey && is_grey(p.albedo) && is_grey(p.emission);
-            const double most = std::max({p.emission.x, p.emission.y, p.emission.z});
+            const double most = largest(p.emission);
             t.brightest = std::max(t.brightest, most);
             if (most > 0) t.emission = 2;
         }
@@ -80,7 +74,7 @@ MediaTraits pack_media(const Scene& scene, DeviceScene& out) {
         uniform_emission = uniform_emission && p.emission == first->emission;
         t.uniform_g = t.uniform_g && m.phase.g == first_g;
         t.grey = t.grey && is_grey(m.albedo) && is_grey(m.emission);
-        const double most = std::max({p.emission.x, p.emission.y, p.emission.z});
+        const double most = largest(p.emission);
         t.brightest = std::max(t.brightest, most);
         if (most > 0) t.emission = 2;
     }
@@ -187,11 +181,6 @@ std::string build_structures(const Structures& wanted, std::optional<int> majora
     return text;
 }
 
-/// Place of `name` in the list, counted from 1.
-int index_of(const std::string& name, std::initializer_list<const char*> names) {
-    return 1 + static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
-}
-
 std::string names(device::uint bits, std::initializer_list<const char*> all) {
     std::string s;
     for (const char* name : all) {
@@ -249,7 +238,8 @@ std::string DeviceScene::hash() const {
     return sha256_hex(all);
 }
 
-DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) {
+/// Without structures, what the scene itself is: every primitive, nothing to find one by.
+static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, bool with_structures) {
     DeviceScene out;
     out.normalization = normalize(scene);
     const MediaTraits traits = pack_media(scene, out);
@@ -259,14 +249,19 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     out.strategy = r.strategy != "auto" ? r.strategy : "delta";
     out.transmittance = r.transmittance != "auto" ? r.transmittance : "analytic";
     out.bound = r.bound != "auto" ? r.bound : out.strategy == "progressive" || r.majorant_grid ? "grid" : "tree";
-    const Structures wanted = structures_of(out, lights.nee != 0, options);
+    const Structures wanted = with_structures ? structures_of(out, lights.nee != 0, options) : Structures{};
 
     const auto start = std::chrono::steady_clock::now();
+    std::uint64_t primitives = 0;
+    for (const auto& m : scene.media) primitives += m.primitives.size();
+    require_memory(scene.path, {{"primitives for the device", primitives * (sizeof(Ellipsoid) + sizeof(device::Primitive))}, {"tree over them", primitives * 2 * sizeof(BvhTree::Node)}});
     out.ellipsoids = make_ellipsoids(scene, out.normalization);
     const Box bounds = bounds_of(out.ellipsoids);
     out.params.bounds_min = pack(bounds.lo);
     out.params.bounds_max = pack(bounds.hi);
-    const std::string accelerator = build_structures(wanted, r.majorant_grid, out);
+    std::string accelerator;
+    if (with_structures) accelerator = build_structures(wanted, r.majorant_grid, out);
+    else pack_primitives(out);
     const GridTraits voxels = pack_grids(scene, out);
     out.accelerator_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
@@ -315,13 +310,13 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     define("CLUME_VISIBLE_BACKGROUND", lights.visible_background);
     define("CLUME_CHANNELS", grey ? 1 : 3);
     define("CLUME_DEPTH_LIMIT", r.max_depth >= 0);
-    define("CLUME_STRATEGY", index_of(out.strategy, {"decomposition", "delta", "march", "march-analytic", "regular", "regular-linear", "progressive"}));
-    define("CLUME_TRANSMITTANCE", index_of(out.transmittance, {"analytic", "march", "ratio", "residual-ratio", "binary"}));
+    define("CLUME_STRATEGY", find_strategy(out.strategy)->program);
+    define("CLUME_TRANSMITTANCE", find_estimator(out.transmittance)->program);
     define("CLUME_SCENE_BOUND", out.bound == "scene");
     if (r.root_finding == "bisection") define("CLUME_BISECTION", 1);
     define("CLUME_ACCEL", wanted.bvh ? 2 : 1);
     define("CLUME_COUNT", options.count_work || out.strategy == "progressive");  // its look-ups are reported
-    if (wanted.bvh) define("CLUME_BVH_STACK", out.bvh_stack);
+    if (wanted.bvh) define("CLUME_BVH_STACK", std::max(1u, out.bvh_stack));  // OpenCL C knows no empty arrays
     define("CLUME_MIXTURE", !out.ellipsoids.empty() || scene.grids.empty());
     define_grids(scene, voxels, out);
     if (!out.cells.empty()) define("CLUME_CELL_LEVELS", options.most_pixels > 0 ? 8 : out.params.cells_levels);  // a pilot's bounds share a program
@@ -347,6 +342,15 @@ DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) 
     say("colour", grey ? "one channel: everything is grey" : "RGB");
     say("depth limit", r.max_depth >= 0 ? std::to_string(r.max_depth) : "left out");
     return out;
+}
+
+DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options) { return pack_scene(scene, options, true); }
+
+std::string scene_hash(const Scene& scene, const RenderOptions& options) {
+    const DeviceScene packed = pack_scene(scene, options, false);
+    std::string all = packed.hash();
+    for (const auto& [name, value] : packed.defines) all += " " + name + "=" + value;
+    return sha256_hex(all);
 }
 
 }  // namespace clume

@@ -50,6 +50,10 @@ struct DeviceScene {
 /// Throws SceneError for what no strategy can render, RenderError for an impossible combination of options.
 DeviceScene make_device_scene(const Scene& scene, const RenderOptions& options);
 
+/// SHA-256 of what any strategy's image of the scene depends on, the seed left out: nothing that strategies look things up in is
+/// built for it. Throws what make_device_scene throws for a scene.
+std::string scene_hash(const Scene& scene, const RenderOptions& options);
+
 /// Sphere about media and area lights, recentred and scaled (src/ellipsoid.h).
 Normalization normalize(const Scene& scene);
 

@@ -8,6 +8,8 @@ namespace clume {
 
 FilmSums::FilmSums(std::size_t active_pixels, int channels, double scale) : pixels_(active_pixels), channels_(channels), scale_(scale) {}
 
+std::uint64_t FilmSums::bytes_per_pixel() { return sizeof(Sums); }
+
 void FilmSums::add(std::size_t first, std::size_t count, std::size_t splits, std::uint32_t samples, std::span<const std::uint64_t> sums) {
     const std::lock_guard lock(mutex_);
     for (std::size_t i = 0; i < count * splits; ++i) {

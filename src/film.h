@@ -21,6 +21,8 @@ public:
     /// for the active pixels [first, first + count), `samples` more samples each. Thread-safe.
     void add(std::size_t first, std::size_t count, std::size_t splits, std::uint32_t samples, std::span<const std::uint64_t> sums);
 
+    static std::uint64_t bytes_per_pixel();
+
     struct Pixel {
         double mean[3], variance[3], alpha;  ///< variance: of the mean
         std::uint32_t samples;

@@ -7,10 +7,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
 #include "src/error.h"
+#include "src/memory_budget.h"
 
 namespace clume {
 
@@ -26,7 +28,7 @@ struct Descriptor {
 }  // namespace
 
 std::uint64_t physical_memory_bytes() {
-    return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+    return std::min(memory_limit(), machine_memory());
 }
 
 std::string read_file_bytes(const std::filesystem::path& path) {
@@ -38,7 +40,7 @@ std::string read_file_bytes(const std::filesystem::path& path) {
     if (::fstat(file.fd, &status) != 0) fail(std::strerror(errno));
     if (!S_ISREG(status.st_mode)) fail("not a file");
     const auto byte_size = static_cast<std::uint64_t>(status.st_size);
-    if (byte_size > physical_memory_bytes()) fail(fmt::format("{} bytes do not fit in memory", byte_size));
+    require_memory(path.string(), {{"the file", byte_size}});
     std::string bytes(byte_size, '\0');
     std::size_t got = 0;
     while (got < bytes.size()) {

@@ -12,7 +12,7 @@ namespace clume {
 /// The whole file. Throws SceneError "path: why" if it isn't there, isn't a file, can't be read or doesn't fit in memory.
 std::string read_file_bytes(const std::filesystem::path& path);
 
-/// Bytes of physical memory in this machine.
+/// Bytes of memory that may be used: this machine's, or less (src/memory_budget.h).
 std::uint64_t physical_memory_bytes();
 
 }  // namespace clume

@@ -26,7 +26,8 @@ struct Slot {
 
 std::array<Slot, 8> slots;
 std::atomic<bool> stop{false};
-std::atomic<std::int64_t> first_interrupt_ns{0};
+std::atomic<std::int64_t> last_interrupt_ns{0};
+std::atomic<bool> put_off{false}, was_put_off{false};
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free &&
               std::atomic<std::int64_t>::is_always_lock_free);
 
@@ -36,21 +37,24 @@ std::int64_t now_ns() {
     return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
 }
 
+void say(const char* text) { [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text)); }
+
 void leave_at_once() {
     for (Slot& slot : slots)
         if (slot.state.load() == slot_used) unlink(slot.path);
-    constexpr char text[] = "\nclume: interrupted twice: nothing was written\n";
-    [[maybe_unused]] const auto written = write(STDERR_FILENO, text, sizeof text - 1);
+    say("\nclume: interrupted twice: left at once\n");
     _exit(interrupted_exit_code);
 }
 
 void on_signal(int signal_number) {
     stop.store(true);
     if (signal_number != SIGINT) return;
-    std::int64_t none = 0;
     const std::int64_t now = now_ns();
-    if (first_interrupt_ns.compare_exchange_strong(none, now)) return;
-    if (now - none >= same_signal_ns) leave_at_once();
+    std::int64_t last = last_interrupt_ns.load();
+    if (last != 0 && now - last < same_signal_ns) return;
+    if (!last_interrupt_ns.compare_exchange_strong(last, now) || last == 0) return;
+    if (!put_off.load() || was_put_off.exchange(true)) leave_at_once();
+    say("\nclume: the image is being written; once more leaves without it\n");
 }
 
 }  // namespace
@@ -64,9 +68,14 @@ void install_interrupt_handlers() {
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);
+    std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN);
     struct sigaction before {};
     if (sigaction(SIGHUP, nullptr, &before) == 0 && before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
 }
+
+PutOffLeaving::PutOffLeaving() { put_off.store(true); }
+PutOffLeaving::~PutOffLeaving() { put_off.store(false); }
 
 int remember_temp_file(const char* path) {
     const std::size_t length = std::strlen(path);

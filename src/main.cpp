@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <iostream>
 #include <new>
@@ -14,21 +15,25 @@
 #include "bench/bench.h"
 #include "runtime/device.h"
 #include "runtime/error.h"
+#include "runtime/hang.h"
 #include "src/bake.h"
 #include "src/cli.h"
 #include "src/compare.h"
 #include "src/compare_report.h"
 #include "src/error.h"
-#include "src/image_writer.h"
 #include "src/info.h"
 #include "src/interrupt.h"
+#include "src/memory_budget.h"
 #include "src/output_file.h"
 #include "src/pilot.h"
 #include "src/printable.h"
 #include "src/progress.h"
 #include "src/renderer.h"
+#include "src/save_image.h"
 #include "src/scene_reader.h"
 #include "src/stats_json.h"
+#include "src/stress.h"
+#include "src/stress_report.h"
 #include "src/voxel_grid.h"
 #include "src/voxel_writer.h"
 
@@ -49,10 +54,11 @@ std::string samples_held(const RenderStats& stats) {
     return fmt::format("{} to {}", stats.samples_min, stats.samples_max);
 }
 
-ImageMetadata describe(const Scene& scene, const RenderCommand& command, const RenderStats& stats) {
+/// `known`: the devices as they were listed before the render, since one that failed had better not be asked again.
+ImageMetadata describe(const Scene& scene, const RenderCommand& command, const RenderStats& stats, const std::vector<DeviceInfo>& known) {
     std::vector<std::string> devices, drivers;
     for (const DeviceShare& device : stats.devices) devices.push_back(device.name);
-    for (const DeviceInfo& device : list_devices()) {
+    for (const DeviceInfo& device : known) {
         const auto is_this = [&](const DeviceShare& share) { return share.name.find(device.name) != std::string::npos; };
         if (std::any_of(stats.devices.begin(), stats.devices.end(), is_this))
             drivers.push_back(device.name + ": " + device.version + ", driver " + device.driver);
@@ -101,6 +107,10 @@ int report(const RenderStats& stats) {
         say(fmt::format("warning: density above its bound {} times: the image may be wrong", stats.bound_violations));
     if (stats.nonfinite_samples > 0)
         say(fmt::format("warning: {} samples were not finite and count as 0", stats.nonfinite_samples));
+    if (stats.device_lost) {
+        say(fmt::format("no device is left: the image holds {} samples per pixel", samples_held(stats)));
+        return 4;
+    }
     if (stats.interrupted) {
         say(fmt::format("interrupted: the image holds {} samples per pixel", samples_held(stats)));
         return interrupted_exit_code;
@@ -109,18 +119,26 @@ int report(const RenderStats& stats) {
     return stats.nonfinite_samples > 0 ? 1 : 0;
 }
 
-int run(const RenderCommand& command) {
+int interrupted_early() {
+    say("interrupted before the first sample: nothing was written");
+    return interrupted_exit_code;
+}
+
+int render_scene(const RenderCommand& command) {
+    if (command.memory_limit) set_memory_limit(*command.memory_limit);
     check_writable(command.exr);
     check_writable(command.png());
     const bool json_on_stdout = command.stats_json && *command.stats_json == "-";
     if (command.stats_json && !json_on_stdout) check_writable(*command.stats_json);
-    install_interrupt_handlers();
 
     Scene scene = read_scene(command.scene, command.overrides);
     if (const auto& crop = command.options.crop; crop && (crop->x1 > scene.film.width || crop->y1 > scene.film.height))
         throw UsageError(fmt::format("--crop {},{},{},{}: reaches beyond the film, which is {} x {}", crop->x0, crop->y0,
                                      crop->x1, crop->y1, scene.film.width, scene.film.height));
+    if (stop_requested()) return interrupted_early();
+    const std::vector<DeviceInfo> known = list_devices();
     const std::optional<Pilot> pilot = run_pilot(scene, command.options, pilot_folder(), stop_requested());
+    if (stop_requested()) return interrupted_early();
     if (pilot) scene = with_pair(std::move(scene), pilot->rows[pilot->chosen].pair);
     if (command.explain) print_explanation(scene, command.options, pilot);
 
@@ -134,19 +152,33 @@ int run(const RenderCommand& command) {
         const auto table = pilot->table();
         stats.explain.insert(stats.explain.end(), table.begin(), table.end());
     }
-    if (stats.samples_max == 0 && (stats.interrupted || stop_requested())) {
-        say("interrupted before the first sample: nothing was written");
-        return interrupted_exit_code;
-    }
+    if (stats.samples_max == 0 && stats.device_lost)
+        throw DeviceError("no device is left, and no sample was done: nothing was written\n  " + join(stats.warnings, "\n  "));
+    if (stats.samples_max == 0 && (stats.interrupted || stop_requested())) return interrupted_early();
     if (stats.samples_max == 0 && stats.time_limited)
         throw RenderError("the time limit was reached before the first sample: nothing was written");
 
-    write_exr(command.exr, result.image, describe(scene, command, stats));
-    write_png(command.png(), result.image, command.exposure_stops);
-    std::FILE* paths = json_on_stdout ? stderr : stdout;
-    std::fputs((command.exr.string() + "\n" + command.png().string() + "\n").c_str(), paths);
-    if (command.stats_json) write_stats_json(*command.stats_json, stats);
-    return report(stats);
+    SavedImage saved = save_image(command.exr, command.png(), result.image, describe(scene, command, stats, known), command.exposure_stops);
+    for (const auto& file : saved.files) std::fputs((file.string() + "\n").c_str(), json_on_stdout ? stderr : stdout);
+    try {
+        if (command.stats_json) write_stats_json(*command.stats_json, stats);
+    } catch (const RenderError& error) {
+        saved.failures.push_back(error.what());
+    }
+    const int code = report(stats);
+    for (const std::string& failure : saved.failures) say(failure);
+    return saved.failures.empty() ? code : 1;
+}
+
+int run(const RenderCommand& command) {
+    install_interrupt_handlers();
+    try {
+        return render_scene(command);
+    } catch (const DeviceError&) {
+        // A compiler inside an OpenCL implementation clears away its files at a signal, and then fails for want of them.
+        if (stop_requested()) return interrupted_early();
+        throw;
+    }
 }
 
 int run(const CompareCommand& command) {
@@ -226,6 +258,30 @@ int run(const BakeCommand& command) {
     return 0;
 }
 
+int run(const StressCommand& command) {
+    const std::vector<DeviceInfo> devices = select_devices(command.devices);
+    const bool json_on_stdout = command.json && *command.json == "-";
+    if (command.json && !json_on_stdout) check_writable(*command.json);
+    if (command.report) check_stress_report(*command.report);
+    std::vector<StressResult> results;
+    for (const DeviceInfo& device : devices) {
+        PartReporter progress("stressing " + device.label(), command.quiet);
+        results.push_back(run_stress(device, {.quick = command.quick}, [&](double part) { progress.update(part); }));
+        progress.finish();
+        std::fputs(stress_table(results.back()).c_str(), json_on_stdout ? stderr : stdout);
+    }
+    if (command.json) write_stress_json(*command.json, results);
+    if (command.report) std::fputs((write_stress_report(*command.report, results).string() + "\n").c_str(), json_on_stdout ? stderr : stdout);
+    bool holds = true;
+    for (const StressResult& result : results)
+        for (const StressRow& row : result.rows) {
+            if (row.holds()) continue;
+            holds = false;
+            say(fmt::format("{}: {} ({}), {}: {}; at {}", result.device, row.quantity, row.function, row.family, row.trouble(), row.worst_at));
+        }
+    return holds ? 0 : 1;
+}
+
 int run(const PrintCommand& command) {
     std::fputs(command.text.c_str(), stdout);
     return 0;
@@ -244,9 +300,8 @@ int with_flushed_output(int code) {
     return code == 0 ? 1 : code;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+/// The exit code, everything said.
+int outcome(int argc, char** argv) {
     try {
         return with_flushed_output(run_all(argc, argv));
     } catch (const UsageError& error) {
@@ -269,4 +324,13 @@ int main(int argc, char** argv) {
         say("an unknown error");
         return 1;
     }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    const int code = outcome(argc, argv);
+    if (!anything_hangs()) return code;
+    std::fflush(nullptr);
+    std::_Exit(code);  // the threads left behind and what they hold can't be cleared away
 }

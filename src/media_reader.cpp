@@ -13,6 +13,7 @@
 #include "src/ellipsoid.h"
 #include "src/error.h"
 #include "src/medium_keys.h"
+#include "src/memory_budget.h"
 #include "src/ply_reader.h"
 
 namespace clume {
@@ -144,7 +145,10 @@ void read_file(MediumContext& context, const SectionReader& medium, const std::f
     const EllipsoidMedium& m = context.medium;
     const double depth_per_peak = central_depth(m.kernel, m.extent);
     read_ply(path, options, [&](const PlyEllipsoid& e, std::size_t index, std::size_t count) {
-        if (index == 0) context.medium.primitives.reserve(count);
+        if (index == 0) {
+            require_memory(path.string(), {{"primitives", count * sizeof(Primitive)}});
+            context.medium.primitives.reserve(count);
+        }
         if (e.g && m.phase.kind == PhaseKind::rayleigh)
             medium.fail("phase",
                         fmt::format("Rayleigh phase, but the primitives of {} have their own g", in_quotes(path.string())));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Temporary file, fsync, rename. Names of temporary files are short and hidden: ".clume-<process>-<count>.tmp".
+// Temporary file, fsync, rename. O_TMPFILE makes files that vanish with the process, even by SIGKILL; they get a name only for
+// the rename. Names of temporary files are short and hidden: ".clume-<process>-<count>.tmp".
 #include "src/output_file.h"
 
 #include <fcntl.h>
@@ -25,6 +26,11 @@ fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.
 
 [[noreturn]] void fail_folder(const fs::path& folder, const std::string& reason) {
     throw RenderError(folder.string() + ": cannot write in this folder: " + reason);
+}
+
+fs::path temp_name(const fs::path& folder) {
+    static std::atomic<unsigned> count{0};
+    return folder / (".clume-" + std::to_string(getpid()) + "-" + std::to_string(count++) + ".tmp");
 }
 
 /// The file that is to be replaced: `path`, or what it links to.
@@ -53,11 +59,12 @@ fs::path resolve_target(const fs::path& path) {
 }  // namespace
 
 OutputFile::OutputFile(const fs::path& path) : path_(path), target_(resolve_target(path)) {
-    static std::atomic<unsigned> count{0};
     const fs::path folder = folder_of(target_);
-    int descriptor = -1;
+    const bool can_be_named = access("/proc/self/fd", X_OK) == 0;
+    int descriptor = can_be_named ? open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666) : -1;
+    unnamed_ = descriptor >= 0;
     for (int attempt = 0; attempt < 100 && descriptor < 0; ++attempt) {
-        temp_ = folder / (".clume-" + std::to_string(getpid()) + "-" + std::to_string(count++) + ".tmp");
+        temp_ = temp_name(folder);
         temp_slot_ = remember_temp_file(temp_.c_str());
         descriptor = open(temp_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         if (descriptor >= 0) break;
@@ -71,7 +78,7 @@ OutputFile::OutputFile(const fs::path& path) : path_(path), target_(resolve_targ
     if (stream_ == nullptr) {
         const int error = errno;
         close(descriptor);
-        unlink(temp_.c_str());
+        if (!temp_.empty()) unlink(temp_.c_str());
         forget_temp_file(temp_slot_);
         fail(reason_of(error));
     }
@@ -89,6 +96,12 @@ void OutputFile::commit() {
     errno = 0;
     if (std::ferror(stream_) != 0) fail(errno != 0 ? reason_of(errno) : "a write failed (is the disk full?)");
     if (std::fflush(stream_) != 0 || fsync(fileno(stream_)) != 0) fail(reason_of(errno));
+    if (unnamed_) {
+        temp_ = temp_name(folder_of(target_));
+        temp_slot_ = remember_temp_file(temp_.c_str());
+        const std::string self = "/proc/self/fd/" + std::to_string(fileno(stream_));
+        if (linkat(AT_FDCWD, self.c_str(), AT_FDCWD, temp_.c_str(), AT_SYMLINK_FOLLOW) != 0) fail(reason_of(errno));
+    }
     std::FILE* closing = stream_;
     stream_ = nullptr;
     if (std::fclose(closing) != 0) fail(reason_of(errno));

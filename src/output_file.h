@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Files that are written whole or not at all: a temporary file in the same folder, synced, then renamed over the target.
+// Files that are written whole or not at all: a file without a name in the same folder (a hidden temporary one where the
+// file system knows none), synced, then renamed over the target. Killed at any moment, it leaves the target as it was.
 // A link is followed (the file it names is replaced); devices, pipes and folders are refused.
 #pragma once
 
@@ -28,6 +29,7 @@ class OutputFile {
     std::filesystem::path path_, target_, temp_;
     std::FILE* stream_ = nullptr;
     int temp_slot_ = -1;
+    bool unnamed_ = false;  ///< temp_ is empty until commit()
 };
 
 /// Finds out, by making and removing a temporary file, whether `path` can be written; to be asked before a long render.

@@ -21,7 +21,13 @@ constexpr std::uint32_t kPixels = 1024;     ///< at most
 constexpr std::uint32_t kSamples = 16;      ///< of each
 constexpr std::uint32_t kFirstSample = 0xc0000000u;  ///< numbers of their own: the image's noise is not what was chosen by
 constexpr std::size_t kFewPrimitives = 64;  ///< up to which one bound for the whole scene may be the cheapest
-constexpr int kVersion = 3;                 ///< of the candidates and of how they are measured
+constexpr int kVersion = 4;                 ///< of the candidates and of how they are measured
+
+std::size_t primitive_count(const Scene& scene) {
+    std::size_t count = 0;
+    for (const auto& m : scene.media) count += m.primitives.size();
+    return count;
+}
 
 /// `pixels` becomes the number rendered.
 PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const std::atomic<bool>& stop, std::uint32_t& pixels) {
@@ -61,10 +67,9 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const std::a
     pilot.spp = kSamples;
     const std::string estimator = scene.render.transmittance == "auto" ? "analytic" : scene.render.transmittance;
     std::vector<MethodPair> candidates;
-    std::size_t primitives = 0;
-    for (const auto& m : scene.media) primitives += m.primitives.size();
+    const std::size_t primitives = primitive_count(scene);
     for (const Method& s : strategies()) {
-        if (s.kind != BiasKind::unbiased || !fits(s, scene)) continue;
+        if (s.kind != BiasKind::unbiased || !differs(s, scene)) continue;
         if (!s.null_collisions) candidates.push_back({s.name, estimator});
         else
             for (const char* bound : bounds()) {
@@ -89,7 +94,7 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const std::a
     if (scene.render.transmittance != "auto" || !samples_lights(scene)) return pilot;
     const MethodPair winner = pilot.rows[pilot.chosen].pair;
     for (const Method& e : estimators())
-        if (e.kind == BiasKind::unbiased && e.name != estimator && fits(e, scene)) pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, stop, pilot.pixels));
+        if (e.kind == BiasKind::unbiased && e.name != estimator) pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, stop, pilot.pixels));
     if (stop.load()) return {};
     const std::size_t best = best_of(pilot.rows);
     if (pilot_margin * pilot.rows[best].inverse_efficiency() < pilot.rows[pilot.chosen].inverse_efficiency()) pilot.chosen = best;
@@ -141,16 +146,14 @@ std::filesystem::path pilot_folder() {
 
 std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options, const std::filesystem::path& folder, const std::atomic<bool>& stop) {
     if (scene.render.strategy != "auto") return std::nullopt;
-    if (scene.media.empty() && scene.grids.empty()) return std::nullopt;
+    if (primitive_count(scene) == 0 && scene.grids.empty()) return std::nullopt;
     // One device is enough, and which one makes no difference.
     RenderOptions one = options;
     one.cpu_split = 0;
     one.batch_samples = 0;
-    const DeviceScene device = make_device_scene(with_pair(scene, {"delta", "analytic"}), one);
-    if (device.ellipsoids.empty() && device.grids.empty()) return std::nullopt;
-    std::string key = fmt::format("pilot {} {} seed {} {} {} {}", kVersion, device.hash(), scene.render.seed, scene.render.transmittance, scene.render.bound, scene.render.majorant_grid.value_or(0));
+    std::string key = fmt::format("pilot {} {} seed {} {} {} {} {}", kVersion, scene_hash(scene, one), scene.render.seed, scene.render.transmittance, scene.render.bound,
+                                  scene.render.majorant_grid.value_or(0), one.accelerator);
     for (const double w : work_weights_ns) key += fmt::format(" {}", w);
-    for (const auto& [name, value] : device.defines) key += " " + name + "=" + value;
     key = sha256_hex(key);
     if (!folder.empty())
         if (const auto bytes = load_binary(folder, key))

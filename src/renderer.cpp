@@ -2,25 +2,31 @@
 #include "src/renderer.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <ctime>
 #include <fmt/format.h>
 #include <memory>
-#include <thread>
+#include <set>
 
+#include "runtime/check.h"
 #include "runtime/device.h"
-#include "runtime/error.h"
+#include "runtime/hang.h"
 #include "src/device_camera.h"
 #include "src/device_renderer.h"
 #include "src/device_scene.h"
 #include "src/error.h"
 #include "src/film.h"
+#include "src/memory_budget.h"
 #include "src/self_test.h"
 
 namespace clume {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+/// Of a pixel of the image and of its preview.
+constexpr std::uint64_t image_bytes = 8 * sizeof(float) + sizeof(std::uint64_t) + 3;
+
 double seconds_since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
 
 /// Tiles of the active pixels, no larger than keeps all devices busy: small ones for CPUs, large ones for GPUs.
@@ -70,6 +76,22 @@ RenderImage develop(const Film& size, const glm::dvec3& b, const CropWindow& w, 
     return image;
 }
 
+/// Whether what rendering takes fits: the scene's copies on CPU devices, film and image, batches, compilers.
+void check_budget(const Scene& scene, const DeviceScene& device, const std::vector<DeviceInfo>& devices, const std::vector<Tile>& tiles, std::uint64_t active_pixels, std::uint64_t all_pixels) {
+    constexpr std::uint64_t compiler_bytes = 200'000'000;  // of an OpenCL implementation that builds the programs inside this process
+    std::uint64_t copies = 0, batches = 0;
+    for (const DeviceInfo& d : devices) {
+        if (d.type == "cpu") copies += device.byte_size() + 4 * active_pixels;
+        batches += DeviceRenderer::batch_bytes(d, tiles);
+    }
+    const std::uint64_t films = device.strategy == "progressive" ? 2 : 1;  // one for what the image does not hold
+    require_memory(scene.path, {{"compilers", compiler_bytes},
+                                {"the scene on CPU devices", copies},
+                                {"batches", batches},
+                                {"film", active_pixels * (films * FilmSums::bytes_per_pixel() + 4)},
+                                {"image", all_pixels * image_bytes}});
+}
+
 void check_memory(const Scene& scene, const DeviceScene& device, const std::vector<DeviceInfo>& devices) {
     for (const auto& d : devices)
         if (device.byte_size() > d.global_memory || 4 * std::max(device.groups.size(), device.grid_values.size()) > d.max_allocation)
@@ -77,6 +99,25 @@ void check_memory(const Scene& scene, const DeviceScene& device, const std::vect
                                           static_cast<double>(device.byte_size()) / 1e6, d.label(), static_cast<double>(d.global_memory) / 1e6,
                                           static_cast<double>(d.max_allocation) / 1e6));
 }
+
+/// What makes one device ready: shared with a thread that may have to be left behind inside a call.
+struct DeviceSetup {
+    DeviceInfo info;
+    std::shared_ptr<const DeviceScene> scene;
+    std::vector<device::uint> pixels;
+    std::vector<Tile> tiles;
+    int vector_width;
+    bool optimised;
+    SelfTestResult test{};
+    std::shared_ptr<DeviceRenderer> renderer{};
+
+    void run() {
+        checked(info.label(), [&] {
+            test = self_test(info, vector_width);
+            if (test.error.empty()) renderer = std::make_shared<DeviceRenderer>(info, *scene, pixels, tiles, vector_width, optimised);
+        });
+    }
+};
 
 }  // namespace
 
@@ -92,6 +133,7 @@ struct Accumulation::State {
     double render_s = 0, cpu_s = 0;
     bool interrupted = false, time_limited = false, device_lost = false;
     std::vector<float> learned{};  ///< bounds of `progressive`; empty before the first pass
+    std::vector<float> raised{};   ///< the highest densities found above them by any device
 
     bool stopped() const { return interrupted || time_limited || device_lost; }
 };
@@ -117,27 +159,35 @@ struct Renderer::Impl {
     int channels = 3;
     double film_scale = 1;
     std::vector<float> first_bounds;               ///< of `progressive`; empty for other strategies
-    std::vector<std::unique_ptr<Worker>> workers;  ///< DeviceRenderers; a device that fails is dropped for good
+    std::set<std::string> told_short_of_memory;
+    Workers workers;                               ///< DeviceRenderers; a device that fails is dropped for good
 
     std::uint64_t all_pixels() const {
         return static_cast<std::uint64_t>(window.x1 - window.x0) * static_cast<std::uint64_t>(window.y1 - window.y0);
     }
-    void make_workers(const std::vector<DeviceInfo>& devices, const DeviceScene& device);
+    void make_workers(const std::vector<DeviceInfo>& devices, const std::shared_ptr<const DeviceScene>& device);
     /// Samples [begin, end) of every tile, by all devices.
     void run_pass(Accumulation::State& a, std::uint32_t begin, std::uint32_t end, const RunControl& control);
     /// The same for `progressive`: passes under bounds that are frozen in each and raised after it.
     void run_learning(Accumulation::State& a, std::uint32_t end, const RunControl& control);
 };
 
-void Renderer::Impl::make_workers(const std::vector<DeviceInfo>& devices, const DeviceScene& device) {
+void Renderer::Impl::make_workers(const std::vector<DeviceInfo>& devices, const std::shared_ptr<const DeviceScene>& device) {
+    // Compilers run here, which may take far longer than a kernel.
+    const double most_s = 10 * options.kernel_timeout_s;
     const auto start = Clock::now();
     for (const auto& d : devices) {
         try {
-            const SelfTestResult test = self_test(d, options.vector_width);
-            if (!test.error.empty()) throw DeviceError(fmt::format("{} fails its self-test: {}", d.label(), test.error));
-            if (!test.outside_exact_set.empty())
-                setup.warnings.push_back(fmt::format("{} is outside the bit-exact set: {}", d.label(), test.outside_exact_set));
-            workers.push_back(std::make_unique<DeviceRenderer>(d, device, pixels, tiles, options.vector_width, options.most_pixels == 0));
+            if (known_to_hang(d.label())) throw DeviceError(fmt::format("{} hangs in an earlier call", d.label()));
+            const auto own = std::make_shared<DeviceSetup>(DeviceSetup{d, device, pixels, tiles, options.vector_width, options.most_pixels == 0});
+            if (!ends_within(most_s, [own] { own->run(); })) {
+                note_hang(d.label());
+                throw DeviceError(fmt::format("{} hangs: self-test, compiling and warming up did not end within {:g} s", d.label(), most_s));
+            }
+            if (!own->test.error.empty()) throw DeviceError(fmt::format("{} fails its self-test: {}", d.label(), own->test.error));
+            if (!own->test.outside_exact_set.empty())
+                setup.warnings.push_back(fmt::format("{} is outside the bit-exact set: {}", d.label(), own->test.outside_exact_set));
+            workers.push_back(std::move(own->renderer));
         } catch (const DeviceError& e) {
             if (devices.size() == 1) throw;
             setup.warnings.push_back(fmt::format("device left out: {}", e.what()));
@@ -157,6 +207,7 @@ void Renderer::Impl::run_pass(Accumulation::State& a, std::uint32_t begin, std::
     o.begin = begin;
     o.end = end;
     o.fixed_chunk = options.batch_samples;
+    o.hang_seconds = options.kernel_timeout_s;
     o.stop = [&] { return stop_asked() || (control.time_limit_s && seconds_since(start) >= *control.time_limit_s); };
     o.progress = [&](const DispatchProgress& p) {
         const double share = static_cast<double>(p.units_done) / static_cast<double>(std::max<std::uint64_t>(1, p.units_total));
@@ -173,6 +224,11 @@ void Renderer::Impl::run_pass(Accumulation::State& a, std::uint32_t begin, std::
         const auto share = std::find_if(a.devices.begin(), a.devices.end(), [&](const DeviceShare& d) { return d.name == w.name; });
         if (share != a.devices.end()) share->busy_s += w.busy_s;
         else a.devices.insert(a.devices.begin(), DeviceShare{w.name, 0, w.busy_s});
+        const auto& renderer = static_cast<const DeviceRenderer&>(*workers[k]);
+        if (const std::size_t items = renderer.short_of_memory(); items > 0 && told_short_of_memory.insert(w.name).second)
+            setup.warnings.push_back(fmt::format("device {} is short of memory: batches of at most {} paths at a time", w.name, items));
+        for (std::size_t i = 0; i < a.raised.size(); ++i) a.raised[i] = std::max(a.raised[i], renderer.raised()[i]);
+        if (w.hung) note_hang(w.name);
         if (w.dropped) workers.erase(workers.begin() + static_cast<std::ptrdiff_t>(k));
     }
     if (report.failed && report.units_done == 0 && begin == a.begin)
@@ -184,20 +240,21 @@ void Renderer::Impl::run_pass(Accumulation::State& a, std::uint32_t begin, std::
 
 // A first look at how high the density goes: passes that the image does not hold, until little exceeds its bound.
 // Then passes that double, each under what all before it have found, so that the share of the image made under low bounds
-// vanishes. Everything is a function of seed and sample numbers, and so are the bounds.
+// vanishes. Everything is a function of seed and sample numbers, and so are the bounds: a pass that ends early goes on under
+// the same ones the next time.
 void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, const RunControl& control) {
     // Optical depth left out, of the bounds'. Not the share of look-ups above their bound: where bounds are far too low there
     // are hardly any look-ups, and those that are stand for much.
     constexpr double enough = 1e-3;
     constexpr float margin = 1.25f;      // over what was found: the highest density is seldom hit
     constexpr std::uint32_t first_warm_up_sample = 0x80000000u;
-    const auto pass = [&](Accumulation::State& film, std::uint32_t begin, std::uint32_t pass_end) {
-        for (const auto& w : workers) static_cast<DeviceRenderer&>(*w).set_learned(a.learned);
+    const auto run = [&](Accumulation::State& film, std::uint32_t begin, std::uint32_t pass_end, bool explore) {
+        film.raised.resize(first_bounds.size());
+        for (const auto& w : workers) static_cast<DeviceRenderer&>(*w).set_learned(a.learned, explore);
         run_pass(film, begin, pass_end, control);
-        for (const auto& w : workers) {
-            const std::vector<float> raised = static_cast<DeviceRenderer&>(*w).raised();
-            for (std::size_t i = 0; i < a.learned.size(); ++i) a.learned[i] = std::max(a.learned[i], margin * raised[i]);
-        }
+    };
+    const auto learn = [&](const Accumulation::State& film) {
+        for (std::size_t i = 0; i < a.learned.size(); ++i) a.learned[i] = std::max(a.learned[i], margin * film.raised[i]);
     };
     if (a.learned.empty()) {
         a.learned = first_bounds;
@@ -205,7 +262,8 @@ void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, con
         for (int k = 0; k < options.progressive_warm_up; ++k) {
             const std::uint32_t begin = first_warm_up_sample + static_cast<std::uint32_t>(k) * samples;
             Accumulation::State scratch{a.seed, begin, begin, FilmSums(pixels.size(), channels, film_scale), {}};
-            pass(scratch, begin, begin + samples);
+            run(scratch, begin, begin + samples, true);
+            learn(scratch);
             a.render_s += scratch.render_s;
             a.cpu_s += scratch.cpu_s;
             a.interrupted = scratch.interrupted;
@@ -215,9 +273,12 @@ void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, con
         }
     }
     while (a.end < end && !a.stopped()) {
-        const std::uint32_t pass_end = std::min(end, a.end + std::max(1u, a.end - a.begin));
-        pass(a, a.end, pass_end);
-        a.end = pass_end;
+        const std::uint32_t done = a.end - a.begin;
+        const std::uint64_t pass_end = std::uint64_t{a.begin} + (done == 0 ? 1 : 2 * std::uint64_t{std::bit_floor(done)});
+        const auto stop = static_cast<std::uint32_t>(std::min<std::uint64_t>(end, pass_end));
+        run(a, a.end, stop, false);
+        a.end = stop;
+        if (stop == pass_end) learn(a);
     }
 }
 
@@ -237,7 +298,8 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     }
     impl_->window = o.crop.value_or(CropWindow{0, 0, scene.film.width, scene.film.height});
 
-    const DeviceScene device = make_device_scene(scene, o);
+    const auto packed = std::make_shared<const DeviceScene>(make_device_scene(scene, o));
+    const DeviceScene& device = *packed;
     RenderStats& stats = impl_->setup;
     stats.strategy = device.strategy;
     stats.transmittance = device.transmittance;
@@ -248,6 +310,7 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     stats.explain = device.explain;
     stats.build_s = device.accelerator_s;
     check_memory(scene, device, devices);
+    require_memory(scene.path, {{"image", impl_->all_pixels() * image_bytes}});
 
     impl_->pixels = active_pixels(scene, device, impl_->window);
     if (const std::size_t n = impl_->pixels.size(); o.most_pixels > 0 && n > o.most_pixels) {
@@ -256,13 +319,14 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
         impl_->pixels = std::move(some);
     }
     impl_->tiles = make_tiles(impl_->pixels.size(), devices);
+    check_budget(scene, device, devices, impl_->tiles, impl_->pixels.size(), impl_->all_pixels());
     stats.empty_pixels = impl_->all_pixels() - impl_->pixels.size();
     const bool grey = std::find(device.defines.begin(), device.defines.end(), std::pair<std::string, std::string>("CLUME_CHANNELS", "1")) != device.defines.end();
     impl_->channels = grey ? 1 : 3;
     impl_->film_scale = static_cast<double>(device.params.film_scale);
     impl_->first_bounds = device.learned;
     for (float& bound : impl_->first_bounds) bound *= static_cast<float>(o.progressive_start);
-    impl_->make_workers(devices, device);
+    impl_->make_workers(devices, packed);
 }
 
 Renderer::~Renderer() = default;

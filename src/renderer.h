@@ -29,6 +29,7 @@ struct RenderOptions {
     std::uint32_t sample_begin = 0;            ///< samples [begin, end) of each pixel; end 0 means render.spp
     std::uint32_t sample_end = 0;
     std::optional<CropWindow> crop;            ///< default: the whole film
+    double kernel_timeout_s = 120;             ///< a device that gives no sign for so long hangs and is given up; 0: never
     std::optional<double> time_limit_s;        ///< stop handing out batches after this long; the image holds what was done
     std::uint32_t batch_samples = 0;           ///< samples of a pixel per batch; 0: sized to 100–200 ms by measurement
     int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own

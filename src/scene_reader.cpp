@@ -15,6 +15,7 @@
 #include "src/input_file.h"
 #include "src/media_reader.h"
 #include "src/medium_keys.h"
+#include "src/memory_budget.h"
 #include "src/scene_schema.h"
 #include "src/voxel_grid.h"
 
@@ -130,7 +131,7 @@ Film read_film(const SectionReader& section) {
     film.width = static_cast<int>(section.integer("width"));
     film.height = static_cast<int>(section.integer("height"));
     constexpr double bytes_per_pixel = 256;  // sums, squares and the images made of them
-    const double needed = bytes_per_pixel * film.width * film.height, held = static_cast<double>(physical_memory_bytes());
+    const double needed = bytes_per_pixel * film.width * film.height, held = static_cast<double>(machine_memory());
     if (needed > held)
         section.fail(film.width >= film.height ? "width" : "height",
                      fmt::format("a film of {} x {} needs {:.1f} GB of memory; this machine has {:.1f}", film.width,

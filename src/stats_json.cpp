@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// RenderStats to JSON with RapidJSON's writer. Text that isn't UTF-8 (a driver's device name may be anything) gets '?'.
+// RenderStats to JSON with RapidJSON's writer.
 #include "src/stats_json.h"
 
 #include <rapidjson/prettywriter.h>
@@ -10,6 +10,7 @@
 #include <cstdio>
 
 #include "src/error.h"
+#include "src/json_text.h"
 #include "src/output_file.h"
 
 namespace clume {
@@ -29,14 +30,7 @@ void put(Writer& out, std::uint32_t value) { out.Uint(value); }
 void put(Writer& out, std::uint64_t value) { out.Uint64(value); }
 
 void put(Writer& out, const std::string& value) {
-    rapidjson::StringStream source(value.c_str());
-    rapidjson::StringBuffer checked;
-    bool valid = true;
-    while (valid && source.Peek() != '\0') valid = rapidjson::UTF8<>::Validate(source, checked);
-    std::string text = value;
-    if (!valid)
-        for (char& c : text)
-            if (static_cast<unsigned char>(c) >= 0x80) c = '?';
+    const std::string text = json_text(value);
     out.String(text.c_str(), static_cast<rapidjson::SizeType>(text.size()));
 }
 

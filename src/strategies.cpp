@@ -4,28 +4,30 @@
 #include <algorithm>
 #include <array>
 
+#include "kernels/layout.h"
+
 namespace clume {
 namespace {
 
 using B = BiasKind;
 
-// name, kind, mixtures, grids, null collisions, about; the most useful first: references are made with the first two unbiased
+// Name, program, in grids, kind, null collisions, about; the most useful first: references are made with the first two unbiased.
 constexpr std::array strategy_table{
-    Method{"delta", B::unbiased, true, true, true, "null collisions under a bound of the extinction"},
-    Method{"decomposition", B::unbiased, true, false, false, "each primitive draws its own collision, the nearest wins"},
-    Method{"regular", B::unbiased, true, true, false, "walks the segments between entries and exits, inverts the last one"},
-    Method{"progressive", B::consistent, true, true, false, "null collisions under a bound that is learned"},
-    Method{"regular-linear", B::biased, true, false, false, "as regular, the last segment taken as homogeneous"},
-    Method{"march-analytic", B::biased, true, false, false, "fixed steps, exact depth of each, collisions spread evenly inside one"},
-    Method{"march", B::biased, true, true, false, "fixed steps, extinction constant inside one"},
+    Method{"delta", STRATEGY_DELTA, STRATEGY_DELTA, B::unbiased, true, "null collisions under a bound of the extinction"},
+    Method{"decomposition", STRATEGY_DECOMPOSITION, STRATEGY_REGULAR, B::unbiased, false, "each primitive draws its own collision, the nearest wins"},
+    Method{"regular", STRATEGY_REGULAR, STRATEGY_REGULAR, B::unbiased, false, "walks the segments between entries and exits, inverts the last one"},
+    Method{"progressive", STRATEGY_PROGRESSIVE, STRATEGY_PROGRESSIVE, B::consistent, false, "null collisions under a bound that is learned"},
+    Method{"regular-linear", STRATEGY_REGULAR_LINEAR, STRATEGY_REGULAR, B::biased, false, "as regular, the last segment taken as homogeneous"},
+    Method{"march-analytic", STRATEGY_MARCH_ANALYTIC, STRATEGY_REGULAR, B::biased, false, "fixed steps, exact depth of each, collisions spread evenly inside one"},
+    Method{"march", STRATEGY_MARCH, STRATEGY_MARCH, B::biased, false, "fixed steps, extinction constant inside one"},
 };
 
 constexpr std::array estimator_table{
-    Method{"analytic", B::unbiased, true, true, false, "exact: exp of minus the summed optical depths"},
-    Method{"ratio", B::unbiased, true, true, true, "product of the null collisions' shares"},
-    Method{"residual-ratio", B::unbiased, true, true, true, "as ratio, over what a control extinction leaves"},
-    Method{"binary", B::unbiased, true, true, false, "a flight that either reaches the light or does not"},
-    Method{"march", B::biased, true, true, false, "fixed steps, extinction constant inside one"},
+    Method{"analytic", TRANSMITTANCE_ANALYTIC, TRANSMITTANCE_ANALYTIC, B::unbiased, false, "exact: exp of minus the summed optical depths"},
+    Method{"ratio", TRANSMITTANCE_RATIO, TRANSMITTANCE_RATIO, B::unbiased, true, "product of the null collisions' shares"},
+    Method{"residual-ratio", TRANSMITTANCE_RESIDUAL_RATIO, TRANSMITTANCE_RESIDUAL_RATIO, B::unbiased, true, "as ratio, over what a control extinction leaves"},
+    Method{"binary", TRANSMITTANCE_BINARY, TRANSMITTANCE_BINARY, B::unbiased, false, "a flight that either reaches the light or does not"},
+    Method{"march", TRANSMITTANCE_MARCH, TRANSMITTANCE_MARCH, B::biased, false, "fixed steps, extinction constant inside one"},
 };
 
 constexpr std::array bound_table{"scene", "grid", "tree"};
@@ -48,9 +50,9 @@ std::span<const char* const> bounds() { return bound_table; }
 const Method* find_strategy(std::string_view name) { return find(strategy_table, name); }
 const Method* find_estimator(std::string_view name) { return find(estimator_table, name); }
 
-bool fits(const Method& method, const Scene& scene) {
+bool differs(const Method& method, const Scene& scene) {
     const bool mixtures = std::any_of(scene.media.begin(), scene.media.end(), [](const auto& m) { return !m.primitives.empty(); });
-    return (method.mixtures || !mixtures) && (method.grids || scene.grids.empty());
+    return mixtures || scene.grids.empty() || method.in_grids == method.program;
 }
 
 std::string MethodPair::label() const { return strategy + (bound == "auto" ? "" : ":" + bound) + "/" + estimator; }
@@ -68,16 +70,20 @@ BiasKind MethodPair::kind(bool estimator_matters) const {
     return estimator_matters && e ? std::max(own, e->kind) : own;
 }
 
+std::vector<MethodPair> pairs_of(const std::string& strategy, const std::string& bound, bool estimator_matters) {
+    std::vector<MethodPair> pairs;
+    for (const Method& e : estimator_table) {
+        pairs.push_back({strategy, e.name, bound});
+        if (!estimator_matters) break;
+    }
+    return pairs;
+}
+
 std::vector<MethodPair> all_pairs(const Scene& scene, bool estimator_matters) {
     std::vector<MethodPair> pairs;
-    for (const Method& s : strategy_table) {
-        if (!fits(s, scene)) continue;
-        for (const Method& e : estimator_table) {
-            if (!fits(e, scene)) continue;
-            pairs.push_back({s.name, e.name});
-            if (!estimator_matters) break;
-        }
-    }
+    for (const Method& s : strategy_table)
+        if (differs(s, scene))
+            for (const MethodPair& p : pairs_of(s.name, "auto", estimator_matters)) pairs.push_back(p);
     return pairs;
 }
 

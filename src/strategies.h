@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The one table of distance sampling strategies and transmittance estimators: what each is called, whether it is biased, and
-// which media it can handle. Everything that lists, chooses or describes them reads it here.
+// The one table of distance sampling strategies and transmittance estimators: what each is called and is to a program, whether
+// it is biased, and what it makes of voxel media. Everything that lists, chooses or describes them reads it here.
 #pragma once
 
 #include <span>
@@ -19,8 +19,9 @@ const char* name_of(BiasKind kind);
 
 struct Method {
     const char* name;
+    int program;            ///< STRATEGY_* or TRANSMITTANCE_* of kernels/layout.h
+    int in_grids;           ///< by which of them it goes through voxel media
     BiasKind kind;
-    bool mixtures, grids;   ///< media that it can handle
     bool null_collisions;   ///< needs a bound of the extinction (render.bound)
     const char* about;
 };
@@ -34,8 +35,9 @@ std::span<const char* const> bounds();
 const Method* find_strategy(std::string_view name);
 const Method* find_estimator(std::string_view name);
 
-/// Whether it can handle every medium of the scene.
-bool fits(const Method& method, const Scene& scene);
+/// Whether it is a method of its own in the scene: with voxel media alone, one that goes through them as another does is that
+/// other one. Any method can handle any scene.
+bool differs(const Method& method, const Scene& scene);
 
 /// A strategy and an estimator that are run together, and the bound of null collisions that they use.
 struct MethodPair {
@@ -51,7 +53,9 @@ struct MethodPair {
     bool operator==(const MethodPair&) const = default;
 };
 
-/// Every pair that fits the scene; with an estimator that does not matter, one pair per strategy.
+/// The strategy with every estimator, or with the first alone if an estimator does not matter.
+std::vector<MethodPair> pairs_of(const std::string& strategy, const std::string& bound, bool estimator_matters);
+/// The same for every strategy that is one of its own in the scene.
 std::vector<MethodPair> all_pairs(const Scene& scene, bool estimator_matters);
 
 /// The scene with the pair's names in its render settings.

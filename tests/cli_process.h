@@ -5,9 +5,11 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <csignal>
@@ -21,10 +23,11 @@ namespace clume::test {
 namespace fs = std::filesystem;
 using Words = std::vector<std::string>;
 
-/// A started clume, in its own folder, with stdout and stderr on pipes.
+/// A started clume, in its own folder, with stdout and stderr on pipes. `environment`: NAME=VALUE added to this process's
+/// own; `before`: a command that starts clume, such as "unshare -m".
 class Process {
   public:
-    Process(const Words& words, const fs::path& folder) {
+    Process(const Words& words, const fs::path& folder, const Words& environment = {}, const Words& before = {}) {
         int out[2], err[2];
         REQUIRE(pipe2(out, O_CLOEXEC) == 0);
         REQUIRE(pipe2(err, O_CLOEXEC) == 0);
@@ -33,10 +36,16 @@ class Process {
         posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
         posix_spawn_file_actions_adddup2(&actions, out[1], STDOUT_FILENO);
         posix_spawn_file_actions_adddup2(&actions, err[1], STDERR_FILENO);
-        std::vector<char*> argv{const_cast<char*>(CLUME_BINARY)};
-        for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+        Words all = before;
+        all.push_back(CLUME_BINARY);
+        all.insert(all.end(), words.begin(), words.end());
+        std::vector<char*> argv, env;
+        for (const std::string& word : all) argv.push_back(const_cast<char*>(word.c_str()));
         argv.push_back(nullptr);
-        const int failed = posix_spawn(&process_, CLUME_BINARY, &actions, nullptr, argv.data(), environ);
+        for (char** variable = environ; *variable != nullptr; ++variable) env.push_back(*variable);
+        for (const std::string& variable : environment) env.push_back(const_cast<char*>(variable.c_str()));
+        env.push_back(nullptr);
+        const int failed = posix_spawnp(&process_, argv[0], &actions, nullptr, argv.data(), env.data());
         posix_spawn_file_actions_destroy(&actions);
         close(out[1]);
         close(err[1]);
@@ -78,12 +87,16 @@ class Process {
         return enough();
     }
     void send(int signal_number) const { kill(process_, signal_number); }
+    /// Largest resident memory of the ended process.
+    std::size_t peak_bytes() const { return peak_bytes_; }
     /// The exit code; minus the signal that killed it; −1000 if it did not end in time.
     int wait(double seconds = 120) {
         read_until([] { return false; }, seconds);
         if (pipes_[0].fd >= 0 || pipes_[1].fd >= 0) return -1000;
         int status = 0;
-        waitpid(process_, &status, 0);
+        rusage usage{};
+        wait4(process_, &status, 0, &usage);
+        peak_bytes_ = static_cast<std::size_t>(usage.ru_maxrss) * 1024;
         ended_ = true;
         return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
     }
@@ -92,6 +105,7 @@ class Process {
 
   private:
     pid_t process_ = 0;
+    std::size_t peak_bytes_ = 0;
     pollfd pipes_[2] = {{-1, 0, 0}, {-1, 0, 0}};
     bool ended_ = false;
 };
@@ -118,5 +132,40 @@ struct SceneFolder {
     }
     std::size_t files() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), {})); }
 };
+
+/// Runs to the end; an ended process.
+struct Run {
+    int code;
+    std::string out, err;
+    Run(const Words& words, const fs::path& folder) {
+        Process process(words, folder);
+        code = process.wait();
+        out = process.out;
+        err = process.err;
+    }
+};
+
+/// A command line that must fail: its exit code, and what is said on stderr about it.
+struct WrongUse {
+    Words words;
+    int code;
+    const char* says;
+};
+
+/// Checks that each ends as it must, having printed nothing on stdout and left no file that was not there before. One line on
+/// stderr, but for code 4: it lists the devices.
+inline void check_wrong_uses(const fs::path& folder, const std::vector<WrongUse>& uses) {
+    const auto files = [&] { return std::distance(fs::recursive_directory_iterator(folder), {}); };
+    const auto before = files();
+    for (const WrongUse& use : uses) {
+        const Run run(use.words, folder);
+        INFO(Catch::StringMaker<Words>::convert(use.words) << "\n" << run.err);
+        CHECK(run.code == use.code);
+        CHECK(run.out.empty());
+        CHECK_THAT(run.err, Catch::Contains(use.says));
+        if (use.code != 4) CHECK(std::count(run.err.begin(), run.err.end(), '\n') == 1);
+        CHECK(files() == before);
+    }
+}
 
 }  // namespace clume::test

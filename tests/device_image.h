@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -42,15 +43,18 @@ inline void set_define(DeviceScene& scene, const std::string& name, const std::s
     scene.defines.emplace_back(name, value);
 }
 
-inline DeviceImage render_device(const Scene& scene, const DeviceScene& device, std::uint32_t spp) {
+/// On the best device of the machine, or on `info`; width 0 is the device's own.
+inline DeviceImage render_device(const Scene& scene, const DeviceScene& device, std::uint32_t spp, const DeviceInfo& info = select_devices({}).front(), int width = 0) {
     DeviceImage image;
     image.pixels = active_pixels(scene, device, {0, 0, scene.film.width, scene.film.height});
     const std::vector<Tile> tiles{{0, static_cast<std::uint32_t>(image.pixels.size())}};
     FilmSums film(image.pixels.size(), define_of(device, "CLUME_CHANNELS") == "1" ? 1 : 3, static_cast<double>(device.params.film_scale));
-    DeviceRenderer renderer(select_devices({}).front(), device, image.pixels, tiles, 0);
+    DeviceRenderer renderer(info, device, image.pixels, tiles, width);
     renderer.aim(film, scene.render.seed);
     renderer.run({0, 0, spp});
+    renderer.commit({0, 0, spp});
     for (std::size_t i = 0; i < image.pixels.size(); ++i) image.values.push_back(film.pixel(i));
+    if (!image.values.empty() && image.values[0].samples != spp) throw std::logic_error("an image without its samples proves nothing");
     image.nonfinite = film.nonfinite();
     image.violations = film.violations();
     return image;

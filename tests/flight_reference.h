@@ -189,6 +189,17 @@ inline DeviceScene fine_cells(const Scene& scene, double step_cost = 0.5) {
     return out;
 }
 
+/// One program for mixtures of all sizes: octrees as deep and stacks as high as any of them needs. Plain grids stay what they are.
+inline DeviceScene share_program(DeviceScene scene) {
+    REQUIRE(scene.params.cells_levels <= 8);
+    REQUIRE(scene.bvh_stack <= 128);
+    for (auto& [name, value] : scene.defines) {
+        if (name == "CLUME_CELL_LEVELS" && value != "0") value = "8";
+        if (name == "CLUME_BVH_STACK") value = "128";
+    }
+    return scene;
+}
+
 /// "cells", "fine" (the above) or "bvh".
 inline DeviceScene decomposition_scene(const Scene& scene, const std::string& accelerator) {
     return accelerator == "fine" ? fine_cells(scene) : device_scene(scene, "decomposition", accelerator);
@@ -224,9 +235,8 @@ struct FlightP {
     double escape_z = 0;  ///< standard deviations by which more escape than should
 };
 
-/// p-values of `count` flights along one ray.
-inline FlightP flight_p(Probe& probe, const std::vector<Ellipsoid>& ellipsoids, const ProbeRay& r, std::size_t count, std::uint32_t sample, bool with_winner = true) {
-    const FlightLaw law(ellipsoids, r, 24);
+/// p-values of `count` flights along one ray, whose law is given.
+inline FlightP flight_p(Probe& probe, const FlightLaw& law, const ProbeRay& r, std::size_t count, std::uint32_t sample, bool with_winner = true) {
     std::map<std::size_t, std::size_t> row;
     for (std::size_t i = 0; i < law.ids.size(); ++i) row[law.ids[i]] = i;
     std::vector<double> observed(law.bins + 1), expected;
@@ -254,6 +264,10 @@ inline FlightP flight_p(Probe& probe, const std::vector<Ellipsoid>& ellipsoids, 
     const double escape = law.by_bin[law.bins];
     return {reference::chi_square(observed, expected).p, with_winner ? reference::chi_square(winners, winners_expected).p : 1,
             (observed[law.bins] - n * escape) / std::sqrt(std::max(n * escape * (1 - escape), 1.0))};
+}
+
+inline FlightP flight_p(Probe& probe, const std::vector<Ellipsoid>& ellipsoids, const ProbeRay& r, std::size_t count, std::uint32_t sample, bool with_winner = true) {
+    return flight_p(probe, FlightLaw(ellipsoids, r, 24), r, count, sample, with_winner);
 }
 
 inline const ProbeRay kFlightRays[] = {ray({0.3, -0.2, -3}, {-0.08, 0.07, 1}), ray({0.05, 0.02, -0.03}, {0.3, -0.9, 0.2}), ray({-0.11, 3, 0.06}, {-0.0, -1, 0.0})};

@@ -14,6 +14,7 @@
 
 #include "src/image_writer.h"
 #include "src/renderer.h"
+#include "tests/reference/analytic_scenes.h"
 #include "tests/reference/host_tracer.h"
 #include "tests/reference/statistics.h"
 
@@ -147,6 +148,21 @@ inline Light constant_light(const glm::dvec3& radiance, bool visible = false) {
     l.radiance = radiance;
     l.visible_to_camera = visible;
     return l;
+}
+
+inline Light point_light(const glm::dvec3& position, const glm::dvec3& intensity) {
+    Light l = light_of(LightKind::point);
+    l.position = position;
+    l.intensity = intensity;
+    return l;
+}
+
+/// 30 Gaussians under a constant light, grey, nothing sampled: every path carries between 0 and 1.
+inline Scene grey_mixture() {
+    Scene scene = reference::random_mixture(KernelFamily::gaussian, 30, 6, 6, 3);
+    scene.film = {16, 16};
+    for (Primitive& p : scene.media[0].primitives) p.albedo = glm::dvec3(0.8);
+    return scene;
 }
 
 /// 16 × 8 texels of uneven colours; one, 1 % of the sphere, is 80 times brighter than the others.

@@ -32,8 +32,9 @@ std::vector<float> evenly_spaced(float lo, float hi, std::size_t count, std::uin
     TestRandom random(seed);
     std::vector<float> x{lo, hi, std::nextafter(lo, hi), std::nextafter(hi, lo)};
     const double a = static_cast<double>(lo), b = static_cast<double>(hi);
-    for (std::size_t i = 0; i < count / 2; ++i) x.push_back(static_cast<float>(a + (b - a) * (static_cast<double>(i) + 0.5) / static_cast<double>(count / 2)));
-    for (std::size_t i = 0; i < count / 2; ++i) x.push_back(static_cast<float>(random.uniform(a, b)));
+    const std::size_t half = count / 2;
+    for (std::size_t i = 0; i < half; ++i) x.push_back(static_cast<float>(a + (b - a) * (static_cast<double>(i) + 0.5) / static_cast<double>(half)));
+    for (std::size_t i = 0; i < half; ++i) x.push_back(static_cast<float>(random.uniform(a, b)));
     return x;
 }
 

@@ -104,10 +104,7 @@ TEST_CASE("Media.FarAndLargeEqualsHost") {
         p.axes = p.axes * size;
         p.sigma_t /= size;
     }
-    Light light = light_of(LightKind::point);
-    light.position = glm::dvec3(-1.2, 1, -0.8) * size + place;
-    light.intensity = glm::dvec3(4) * size * size;
-    scene.lights = {light};
+    scene.lights = {point_light(glm::dvec3(-1.2, 1, -0.8) * size + place, glm::dvec3(4) * size * size)};
     check_against_host("far", scene, {delta});
 }
 

@@ -59,17 +59,6 @@ VoxelGrid bake_all(const Scene& scene, int resolution) {
     return *grid;
 }
 
-struct Outcome {
-    int code;
-    std::string out, err;
-};
-
-Outcome run_clume(const Words& words, const fs::path& folder) {
-    Process process(words, folder);
-    const int code = process.wait();
-    return {code, process.out, process.err};
-}
-
 }  // namespace
 
 TEST_CASE("Bake.SamplesAreTheDensityAtVoxelCentres", "[quick]") {
@@ -179,7 +168,7 @@ TEST_CASE("Bake.CommandWritesAFileThatScenesCanUse") {
     const TempFolder folder;
     folder.write("s.json", mixture());
     for (const std::string name : {"out.vol", "out.nvdb", "out.vdb"}) {
-        const Outcome out = run_clume({"bake", "s.json", "--resolution", "24", "-o", name}, folder.path());
+        const Run out({"bake", "s.json", "--resolution", "24", "-o", name}, folder.path());
         INFO(out.err);
         REQUIRE(out.code == 0);
         CHECK(out.out == name + "\n");
@@ -192,7 +181,7 @@ TEST_CASE("Bake.CommandWritesAFileThatScenesCanUse") {
                                         folder.path() / "t.json");
         REQUIRE(scene.grids.size() == 1);
         CHECK(scene.grids[0].density.values == bake_all(scene_of(mixture()), 24).values);
-        const Outcome info = run_clume({"info", name}, folder.path());
+        const Run info({"info", name}, folder.path());
         INFO(info.out);
         CHECK(info.code == 0);
         CHECK(info.out.find(name == "out.vol" ? "float32" : "\"density\", float") != std::string::npos);
@@ -224,24 +213,17 @@ TEST_CASE("Bake.InterruptLeavesNothing") {
 TEST_CASE("Bake.WrongUseIsOneLine") {
     const TempFolder folder;
     folder.write("s.json", mixture());
-    const auto check = [&](const Words& words, int code, const std::string& part) {
-        const Outcome out = run_clume(words, folder.path());
-        INFO(out.err);
-        CHECK(out.code == code);
-        CHECK(out.out.empty());
-        CHECK(out.err.find(part) != std::string::npos);
-        CHECK(std::count(out.err.begin(), out.err.end(), '\n') == 1);
-    };
-    check({"bake"}, 2, "bake: which scene?");
-    check({"bake", "s.json", "--resolution", "8"}, 2, "bake: into which file?");
-    check({"bake", "s.json", "-o", "a.vol"}, 2, "how many voxels");
-    check({"bake", "s.json", "-o", "a.png", "--resolution", "8"}, 2, "must end in .vol, .nvdb or .vdb");
-    check({"bake", "s.json", "-o", "a.vol", "--resolution", "0"}, 2, "must lie between 1 and 4096");
-    check({"bake", "s.json", "-o", "a.vol", "--resolution", "4097"}, 2, "must lie between 1 and 4096");
-    check({"bake", "s.json", "-o", "a.vol", "--resolution", "many"}, 2, "many");
-    check({"bake", "s.json", "-o", "a.vol", "--resolutio", "8"}, 2, "the nearest is '--resolution'");
-    check({"bake", "none.json", "-o", "a.vol", "--resolution", "8"}, 3, "no such file");
-    check({"bake", "s.json", "-o", "none/a.vol", "--resolution", "8"}, 1, "it does not exist");
-    check({"bake", "s.json", "-o", "a.vol", "--resolution", "8", "-D", "render.sp=1"}, 2, "did you mean \"spp\"?");
-    CHECK_FALSE(std::filesystem::exists(folder.path() / "a.vol"));
+    check_wrong_uses(folder.path(), {
+        {{"bake"}, 2, "bake: which scene?"},
+        {{"bake", "s.json", "--resolution", "8"}, 2, "bake: into which file?"},
+        {{"bake", "s.json", "-o", "a.vol"}, 2, "how many voxels"},
+        {{"bake", "s.json", "-o", "a.png", "--resolution", "8"}, 2, "must end in .vol, .nvdb or .vdb"},
+        {{"bake", "s.json", "-o", "a.vol", "--resolution", "0"}, 2, "must lie between 1 and 4096"},
+        {{"bake", "s.json", "-o", "a.vol", "--resolution", "4097"}, 2, "must lie between 1 and 4096"},
+        {{"bake", "s.json", "-o", "a.vol", "--resolution", "many"}, 2, "many"},
+        {{"bake", "s.json", "-o", "a.vol", "--resolutio", "8"}, 2, "the nearest is '--resolution'"},
+        {{"bake", "none.json", "-o", "a.vol", "--resolution", "8"}, 3, "no such file"},
+        {{"bake", "s.json", "-o", "none/a.vol", "--resolution", "8"}, 1, "it does not exist"},
+        {{"bake", "s.json", "-o", "a.vol", "--resolution", "8", "-D", "render.sp=1"}, 2, "did you mean \"spp\"?"},
+    });
 }

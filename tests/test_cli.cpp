@@ -140,13 +140,8 @@ TEST_CASE("CommandLine.HelpAndVersionSucceed", "[quick]") {
 
 TEST_CASE("Binary.ExitCodes") {
     const SceneFolder folder;
-    struct Case {
-        Words words;
-        int code;
-        const char* says;
-    };
     std::ofstream(folder.path / "broken.json") << "{\n  \"film\": {";
-    const std::vector<Case> cases{
+    check_wrong_uses(folder.path, {
         {{"render", "puff.json", "--sppp", "3"}, 2, "'--spp'"},
         {{"nosuch"}, 2, "unknown subcommand"},
         {{"render", "puff.json", "--spp", "zero"}, 2, "--spp zero"},
@@ -156,16 +151,7 @@ TEST_CASE("Binary.ExitCodes") {
         {{"render", "puff.json", "--device", "nosuchdevice"}, 4, "nosuchdevice"},
         {{"render", "puff.json", "-o", "none/a.exr"}, 1, "none: cannot write in this folder"},
         {{"render", "puff.json", "--stats-json", "none/a.json"}, 1, "none: cannot write in this folder"},
-    };
-    for (const Case& c : cases) {
-        Process process(c.words, folder.path);
-        const int code = process.wait();
-        INFO(Catch::StringMaker<Words>::convert(c.words) << "\n" << process.err);
-        CHECK(code == c.code);
-        CHECK(process.out.empty());
-        CHECK_THAT(process.err, Catch::Contains(c.says));
-        CHECK(folder.files() == 2);
-    }
+    });
 }
 
 TEST_CASE("Binary.UnknownDeviceListsThoseThereAre") {

@@ -21,18 +21,6 @@ const std::string lights = R"("lights": [ { "type": "constant", "radiance": 1 } 
 
 void write(const fs::path& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
 
-/// Runs to the end; an ended process.
-struct Run {
-    int code;
-    std::string out, err;
-    Run(const Words& words, const fs::path& folder) {
-        Process process(words, folder);
-        code = process.wait();
-        out = process.out;
-        err = process.err;
-    }
-};
-
 std::string value_of(const ImageMetadata& metadata, const std::string& key) {
     for (const auto& [k, v] : metadata)
         if (k == key) return v;

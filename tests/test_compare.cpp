@@ -222,12 +222,7 @@ TEST_CASE("Binary.CompareRefusesWhatIsNotItsOwn") {
         image.samples.resize(4);
         return image;
     }());
-    struct Case {
-        Words words;
-        int code;
-        const char* says;
-    };
-    const std::vector<Case> cases{
+    check_wrong_uses(folder.path, {
         {{"compare"}, 2, "which scene?"},
         {{"compare", "puff.json", "--strategies", "dleta"}, 2, "the nearest is 'delta'"},
         {{"compare", "puff.json", "--strategies", "delta/ration"}, 2, "the nearest is 'ratio'"},
@@ -246,17 +241,7 @@ TEST_CASE("Binary.CompareRefusesWhatIsNotItsOwn") {
         {{"compare", "puff.json", "--device", "nosuchdevice", "-o", "new"}, 4, "nosuchdevice"},
         {{"compare", "puff.json", "-o", "mine"}, 1, "nothing was changed"},
         {{"compare", "puff.json", "-o", "puff.json"}, 1, "is not a folder"},
-    };
-    for (const Case& c : cases) {
-        Process process(c.words, folder.path);
-        const int code = process.wait();
-        INFO(Catch::StringMaker<Words>::convert(c.words) << "\n" << process.err);
-        CHECK(code == c.code);
-        CHECK(process.out.empty());
-        CHECK_THAT(process.err, Catch::Contains(c.says));
-        if (c.code != 4) CHECK(std::count(process.err.begin(), process.err.end(), '\n') == 1);
-        CHECK_FALSE(fs::exists(folder.path / "new"));
-    }
+    });
     CHECK(read_text(folder.path / "mine/thesis.txt") == "years of work");
     CHECK(read_text(folder.path / "mine/results.json") == "{\"mine\": 1}");
 }

@@ -218,6 +218,4 @@ TEST_CASE("Strategies.PairsAndTheirKinds", "[quick]") {
     CHECK(MethodPair{"progressive", "analytic"}.kind(true) == BiasKind::consistent);
     CHECK(MethodPair{"delta", "ratio", "scene"}.label() == "delta:scene/ratio");
     CHECK(MethodPair{"delta", "ratio", "scene"}.file_name() == "delta-scene_ratio");
-    scene.grids.resize(1);
-    for (const MethodPair& p : all_pairs(scene, true)) CHECK(p.strategy != "decomposition");
 }

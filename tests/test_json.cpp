@@ -7,6 +7,7 @@
 
 #include "src/error.h"
 #include "src/json_reader.h"
+#include "src/json_text.h"
 
 using namespace clume;
 
@@ -121,4 +122,12 @@ TEST_CASE("Json.DepthIsLimited", "[quick]") {
 TEST_CASE("Json.QuotedTextStaysOneLine", "[quick]") {
     CHECK(in_quotes("a\nb") == "\"a\\x0ab\"");
     CHECK(in_quotes(std::string(500, 'x')).size() < 100);
+}
+
+TEST_CASE("JsonText.IsUtf8", "[quick]") {
+    for (const char* good : {"", "PoCL 3.1", "caf\xC3\xA9 \xE2\x82\xAC \xF0\x9F\x98\x80"}) CHECK(json_text(good) == good);
+    CHECK(json_text("caf\xE9 4") == "caf? 4");
+    CHECK(json_text("\xC3\xA9 and \xFF") == "?? and ?");
+    CHECK(json_text("cut \xE2\x82") == "cut ??");
+    CHECK(json_text(std::string("a\0\xFF", 3)) == std::string("a\0?", 3));
 }

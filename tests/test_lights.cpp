@@ -60,13 +60,6 @@ Light rectangle(const glm::dvec3& corner, const glm::dvec3& u, const glm::dvec3&
     return l;
 }
 
-Light point(const glm::dvec3& position, const glm::dvec3& intensity) {
-    Light l = light_of(LightKind::point);
-    l.position = position;
-    l.intensity = intensity;
-    return l;
-}
-
 Light spot() {
     Light l = light_of(LightKind::spot);
     l.position = {1.5, 2, -1};
@@ -123,11 +116,11 @@ TEST_CASE("Lights.EnvironmentImageQuick", "[quick]") {
 
 TEST_CASE("Lights.PointEqualsHost") {
     Scene scene = mixture();
-    scene.lights = {point({-1.2, 1, -0.8}, {4, 3, 2})};
+    scene.lights = {point_light({-1.2, 1, -0.8}, {4, 3, 2})};
     check_against_host("point", scene, sampled);
     // Amid the medium, where it is empty: inside its bounds, yet 1/r² stays bounded.
     scene = ring();
-    scene.lights = {point({0.05, -0.03, 0}, glm::dvec3(2))};
+    scene.lights = {point_light({0.05, -0.03, 0}, glm::dvec3(2))};
     check_against_host("point_amid", scene, mis);
 }
 
@@ -182,7 +175,7 @@ TEST_CASE("Lights.AllTogetherEqualHost") {
                     constant_light({0.1, 0.2, 0.3}),
                     contrast_environment(true, 1.1),
                     contrast_environment(false, -0.4),
-                    point({-1.4, 0.9, -0.9}, {1, 2, 1}),
+                    point_light({-1.4, 0.9, -0.9}, {1, 2, 1}),
                     spot(),
                     sun(),
                     sphere({-0.6, -0.9, -0.7}, 0.3, {3, 1, 2}),

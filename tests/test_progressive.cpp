@@ -2,6 +2,7 @@
 // `progressive` as a whole: from bounds far too low its bias falls below the noise as passes grow, what it says of its bounds
 // falls with it, and an image is a function of seed and samples alone.
 #include "runtime/device.h"
+#include "src/strategies.h"
 #include "tests/pairs.h"
 
 using namespace clume;
@@ -76,11 +77,12 @@ TEST_CASE("Progressive.BiasFallsBelowTheNoise") {
 }
 
 TEST_CASE("Progressive.LearnsBeforeTheImageBegins") {
-    // The passes that no image holds make up for the low start: already a few samples pass, the first one too.
+    // The passes that no image holds make up for the low start, cell by cell: already a few samples pass, the first one too. They
+    // look into every cell they cross, so three of them do: without that, bounds so low lead to hardly any look-ups.
     const Scene scene = body();
     const Estimate truth = colour_of(render_pair({"delta"}, scene, 2048, 5).image);
     for (const std::uint32_t spp : {1u, 4u, 16u, 256u}) {
-        const RenderResult r = render_pair(kProgressive, scene, spp, 3, from_too_low(24));
+        const RenderResult r = render_pair(kProgressive, scene, spp, 3, from_too_low(3));
         CHECK(share_above(r.stats) < 2e-3);
         const Bias bias = bias_of(r.image, truth);
         INFO(spp << " spp: z " << bias.z());
@@ -115,5 +117,24 @@ TEST_CASE("Progressive.IsAFunctionOfTheSamples") {
         options.cpu_split = 2;
         options.devices = {"cpu"};
         check("two devices");
+    }
+}
+
+TEST_CASE("Progressive.PartsOfInterleavedSeedsAddUpToSingleRuns") {
+    // What one seed has learned is no part of the other, and a pass may end in the middle.
+    Scene scene = with_pair(body(), {"progressive", "analytic"});
+    RenderOptions options = from_too_low(1);
+    Renderer renderer(scene, options);
+    Accumulation a = renderer.start(5), b = renderer.start(6);
+    for (const std::uint32_t end : {1u, 3u, 5u, 6u, 13u, 21u}) {
+        renderer.extend(a, end);
+        renderer.extend(b, end);
+    }
+    for (const auto& [film, seed] : {std::pair{&a, 5u}, {&b, 6u}}) {
+        Renderer alone(scene, options);
+        Accumulation whole = alone.start(seed);
+        alone.extend(whole, 21);
+        CHECK(renderer.result(*film).image.rgb == alone.result(whole).image.rgb);
+        CHECK(renderer.result(*film).stats.excess == alone.result(whole).stats.excess);
     }
 }

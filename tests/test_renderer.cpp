@@ -15,10 +15,7 @@ namespace {
 Scene lit_mixture() {
     Scene scene = random_mixture(KernelFamily::gaussian, 40, 3, 6, 3);
     scene.film = {24, 20};
-    Light point = light_of(LightKind::point);
-    point.position = {1.5, 1, -1};
-    point.intensity = {3, 2, 1};
-    scene.lights = {point};
+    scene.lights = {point_light({1.5, 1, -1}, {3, 2, 1})};
     return scene;
 }
 

@@ -1,18 +1,18 @@
 # Made by clume bench --study; `gnuplot baked.gp` in this folder makes the plot again.
 set encoding utf8
 $data0 << EOD
-16 38.2757
-32 21.1565
-64 9.48892
-128 3.80297
-256 1.71564
+16 38.4688
+32 20.9892
+64 9.32312
+128 3.56881
+256 1.22881
 EOD
 $data1 << EOD
-16 38.0206
-32 16.172
-64 4.25332
-128 0.92415
-256 0.351091
+16 37.7924
+32 16.0133
+64 4.21318
+128 1.09932
+256 0.578013
 EOD
 set terminal svg size 900,480 dynamic noenhanced font 'sans-serif,14' background 'white'
 set output 'baked.svg'

@@ -1,16 +1,16 @@
 # Made by clume bench --study; `gnuplot homogeneous.gp` in this folder makes the plot again.
 set encoding utf8
 $data0 << EOD
-1 5.93286
-4 1.46142
-16 0.906443
-64 0.683502
+1 5.88872
+4 1.15287
+16 0.697468
+64 0.797169
 EOD
 $data1 << EOD
-1 34.6628
-4 16.8239
-16 3.96918
-64 0.988473
+1 34.5636
+4 16.3707
+16 3.87451
+64 1.00553
 EOD
 set terminal svg size 900,480 dynamic noenhanced font 'sans-serif,14' background 'white'
 set output 'homogeneous.svg'

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the study leaves behind: in DOCS/images/strategies/ a CSV file, a gnuplot script with its data, and an SVG and a PNG
-// per plot; in DOCS/strategies.md tables, between `<!-- table NAME -->` and `<!-- end -->`. The page's prose is left alone.
+// What a measurement leaves in the documentation: in a folder of images a CSV file, a gnuplot script with its data, and an SVG
+// and a PNG per plot; in a page tables, between `<!-- table NAME -->` and `<!-- end -->`. The page's prose is left alone.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace clume::bench {
+namespace clume {
 
 /// A line of a plot; a y that is no finite number is a gap.
 struct Series {
@@ -26,12 +26,12 @@ using Table = std::vector<std::vector<std::string>>;  ///< the first row is the 
 
 class Report {
 public:
-    /// Makes the folder for images. Throws RenderError.
-    explicit Report(std::filesystem::path docs);
+    /// Makes the folder for images. `made_by`: the command, for the scripts. Throws RenderError.
+    Report(std::filesystem::path page, std::filesystem::path images, std::string made_by);
 
     void csv(const std::string& name, const Table& rows) const;
-    /// A remark on standard error if gnuplot cannot be run; the script is there then.
-    void plot(const std::string& name, const Plot& plot) const;
+    /// The path of the SVG, which is not there, with a remark on standard error, if gnuplot cannot be run; the script is there then.
+    std::filesystem::path plot(const std::string& name, const Plot& plot) const;
     /// Throws RenderError if the page has no place for it. A page that is not there is not written.
     void table(const std::string& name, const Table& rows) const { text(name, markdown(rows)); }
     void text(const std::string& name, const std::string& text) const;
@@ -39,7 +39,8 @@ public:
     static std::string markdown(const Table& rows);
 
 private:
-    std::filesystem::path docs_, images_;
+    std::filesystem::path page_, images_;
+    std::string made_by_;
 };
 
-}  // namespace clume::bench
+}  // namespace clume

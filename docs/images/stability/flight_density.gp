@@ -1,0 +1,91 @@
+# Made by clume stress --report; `gnuplot flight_density.gp` in this folder makes the plot again.
+set encoding utf8
+$data0 << EOD
+5.62341e-11 2.22541e-06
+1.77828e-10 1.48735e-06
+5.62341e-10 5.08966e-06
+1.77828e-09 7.78669e-06
+5.62341e-09 1.18784e-05
+1.77828e-08 2.35908e-05
+5.62341e-08 2.48977e-05
+1.77828e-07 2.90423e-05
+5.62341e-07 0.000193472
+1.77828e-06 0.000582345
+5.62341e-06 0.000363943
+1.77828e-05 0.00234535
+5.62341e-05 0.00833178
+0.000177828 0.00164318
+0.000562341 0.00217096
+1778.28 0.00473037
+5623.41 0.00589895
+17782.8 0.00312216
+56234.1 0.00179018
+177828 0.00137104
+562341 0.00487014
+1.77828e+06 0.0019662
+5.62341e+06 0.00693419
+1.77828e+07 0.00500689
+5.62341e+07 0.00423396
+1.77828e+08 0.00497901
+5.62341e+08 0.00189142
+1.77828e+09 0.00317478
+5.62341e+09 0.00488384
+1.77828e+10 0.00308393
+5.62341e+10 0.00150824
+1.77828e+11 0.00583289
+5.62341e+11 0.00528584
+EOD
+$data1 << EOD
+5.62341e-11 0.0001026
+1.77828e-10 0.000117731
+5.62341e-10 5.98597e-05
+1.77828e-09 7.79106e-05
+5.62341e-09 7.18491e-05
+1.77828e-08 7.03981e-05
+5.62341e-08 0.000149241
+1.77828e-07 0.000358256
+5.62341e-07 0.00109091
+1.77828e-06 0.00277074
+5.62341e-06 0.00119504
+1.77828e-05 0.00929387
+5.62341e-05 0.0174947
+0.000177828 0.00416279
+0.000562341 0.0163443
+1778.28 0.0237641
+5623.41 0.0209593
+17782.8 0.00767051
+56234.1 0.0112528
+177828 0.00390062
+562341 0.0190407
+1.77828e+06 0.0121053
+5.62341e+06 0.0199046
+1.77828e+07 0.0299541
+5.62341e+07 0.0205052
+1.77828e+08 0.0157203
+5.62341e+08 0.014616
+1.77828e+09 0.0149727
+5.62341e+09 0.0158553
+1.77828e+10 0.00818061
+5.62341e+10 0.00428743
+1.77828e+11 0.0239658
+5.62341e+11 0.0196242
+EOD
+set terminal svg size 900,480 dynamic noenhanced font 'sans-serif,14' background 'white'
+set output 'flight_density.svg'
+set title 'Free flight, Gaussian, by depth: 90 % of the cases are below'
+set xlabel 'peak extinction × scale along the ray'
+set ylabel 'relative error'
+set logscale x
+set logscale y
+set format x '%g'
+set format y '%g'
+set grid xtics ytics lc rgb '#dddddd' lw 1 dt 1
+set key outside right center reverse Left samplen 2
+set xrange [4.49873e-11:7.02927e+11]
+set xtics autofreq
+plot $data0 using 1:2 with linespoints lc rgb '#0072b2' pt 7 lw 2 ps 1 title 'clume', \
+     $data1 using 1:2 with linespoints lc rgb '#d55e00' pt 5 lw 2 ps 1 title 'inversion from t = 0'
+set terminal pngcairo size 1260,672 noenhanced font 'sans,14' fontscale 1.3 linewidth 1.4 pointscale 1.4 background 'white'
+set output 'flight_density.png'
+replot
+unset output

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: MIT
+#include "tests/entry_points.h"
+
+#include <bit>
+
+#include "src/self_test.h"
+#include "tests/device_image.h"
+
+namespace clume::test {
+namespace {
+
+using namespace probing;
+
+template <class Value>
+void keep(Outputs& outputs, const std::string& name, const std::vector<Value>& values) {
+    static_assert(sizeof(Value) % 4 == 0);
+    std::vector<std::uint32_t>& words = outputs[name];
+    for (const Value& v : values) {
+        const auto all = std::bit_cast<std::array<std::uint32_t, sizeof(Value) / 4>>(v);
+        words.insert(words.end(), all.begin(), all.end());
+    }
+}
+
+/// Arguments of a function: x in its domain and y.
+struct Domain {
+    const char* name;
+    MathFunction f;
+    float lo, hi;
+    bool log_spaced;
+};
+const Domain kDomains[] = {
+    {"rcp", MathFunction::rcp, 1e-18f, 1e18f, true},
+    {"divide", MathFunction::divide, 1e-9f, 1e9f, true},
+    {"rsqrt", MathFunction::rsqrt, 1e-18f, 1e18f, true},
+    {"sqrt", MathFunction::sqrt, 1e-18f, 1e18f, true},
+    {"exp", MathFunction::exp, -80, 20, false},
+    {"log", MathFunction::log, 1e-30f, 1e30f, true},
+    {"exponential", MathFunction::exponential, 1e-38f, 1e38f, true},
+    {"erfc", MathFunction::erfc, -5, 9, false},
+    {"erfc_inverse", MathFunction::erfc_inverse, 1e-30f, 1.99f, true},
+    {"epanechnikov_inverse", MathFunction::epanechnikov_inverse, 0, 1, false},
+    {"asin", MathFunction::asin, -1, 1, false},
+    {"acos", MathFunction::acos, -1, 1, false},
+    {"atan2", MathFunction::atan2, -3, 3, false},
+    {"sin", MathFunction::sin_turns, 0, 1, false},
+    {"cos", MathFunction::cos_turns, 0, 1, false},
+    {"erf_between", MathFunction::erf_between, -4, 2, false},
+    {"uniform", MathFunction::uniform, 1e-38f, 1e38f, true},
+    {"from_uint", MathFunction::from_uint, 1e-38f, 1e38f, true},
+    {"normalize", MathFunction::normalize_x, 1e-6f, 1e6f, true},
+};
+
+std::vector<float> arguments(const Domain& d, std::size_t count) {
+    TestRandom random(7);
+    std::vector<float> x{d.lo, d.hi};
+    while (x.size() < count) {
+        const double lo = static_cast<double>(d.lo), hi = static_cast<double>(d.hi);
+        x.push_back(std::clamp(static_cast<float>(d.log_spaced ? random.spread(lo, hi) : random.uniform(lo, hi)), d.lo, d.hi));
+    }
+    return x;
+}
+
+/// Lights of every kind; with those of `mixed_scene` all seven.
+void add_lights(Scene& scene) {
+    Light point = light_of(LightKind::point), spot = light_of(LightKind::spot), sphere = light_of(LightKind::sphere), sheet = light_of(LightKind::rectangle);
+    point.position = {1.4, 1.1, -0.6};
+    point.intensity = {2, 1, 1.5};
+    spot.position = {-1.5, 0.8, -1};
+    spot.target = {0.1, 0, 0};
+    spot.intensity = {6, 7, 8};
+    spot.beam_rad = 0.2;
+    spot.cutoff_rad = 0.5;
+    sphere.center = {0.3, -1.5, 0.2};
+    sphere.radius = 0.15;
+    sphere.radiance = {9, 5, 4};
+    sheet.corner = {-1.2, 1.3, 0.4};
+    sheet.edge_u = {0.5, 0.1, 0};
+    sheet.edge_v = {0, 0.2, 0.6};
+    sheet.radiance = {3, 4, 5};
+    for (const Light& l : {point, spot, sphere, sheet, constant_light({0.2, 0.3, 0.4}, true)}) scene.lights.push_back(l);
+}
+
+}  // namespace
+
+std::span<const MethodCase> method_cases() {
+    static const MethodCase cases[] = {
+        {{"delta", "analytic", "tree", "newton", "bvh"}, true},
+        {{"delta", "ratio", "grid"}, true},
+        {{"delta", "residual-ratio", "scene"}, true},
+        {{"decomposition", "analytic", "auto", "newton", "cells"}, false},
+        {{"decomposition", "binary", "auto", "newton", "bvh"}, false},
+        {{"regular", "residual-ratio", "tree"}, true},
+        {{"regular", "analytic", "auto", "bisection", "cells"}, true},
+        {{"regular-linear", "march"}, true},
+        {{"march-analytic", "ratio", "tree"}, true},
+        {{"march", "march", "auto", "newton", "bvh"}, true},
+        {{"progressive", "binary", "tree"}, true},
+        {{"progressive", "analytic", "scene"}, true},
+    };
+    return cases;
+}
+
+Scene everything(bool grids) {
+    Scene scene = grids ? mixed_grid_scene() : mixed_scene();
+    scene.film = {16, 16};
+    scene.render.rr_depth = 2;
+    scene.media[2].phase = {PhaseKind::rayleigh, 0};
+    add_lights(scene);
+    if (!grids) return scene;
+    GridMedium fire = grid_medium(voxel_grid({0, 0, 0}, {9, 11, 10}, random_samples(5), false, glm::dmat3(0.1), {-0.2, -0.9, -0.6}), 4, Interpolation::nearest);
+    fire.emission_grid = voxel_grid({0, 0, 0}, {9, 11, 10}, random_samples(6), false, glm::dmat3(0.1), {-0.2, -0.9, -0.6});
+    fire.emission = {2, 1, 0.5};
+    scene.grids.push_back(fire);
+    return scene;
+}
+
+Scene hardly_anything() {
+    Scene scene = reference::random_mixture(KernelFamily::gaussian, 40, 12, 12, 3);
+    scene.film = {16, 16};
+    scene.camera.kind = CameraKind::orthographic;
+    scene.camera.width = 2.2;
+    for (Primitive& p : scene.media[0].primitives) p.albedo = glm::dvec3(0.8);
+    return scene;
+}
+
+Scene scene_of(const MethodCase& c) { return everything(c.grids); }
+
+DeviceScene packed(const Scene& scene, const Pair& pair) {
+    Scene s = scene;
+    s.render.strategy = pair.strategy;
+    s.render.transmittance = pair.estimator;
+    s.render.bound = pair.bound;
+    s.render.root_finding = pair.root;
+    RenderOptions options;
+    options.accelerator = pair.accelerator;
+    return make_device_scene(s, options);
+}
+
+Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t count) {
+    Outputs out;
+    Probe probe(device, width);
+    const SelfTestResult arithmetic = self_test(device, width);
+    out["probe_arithmetic"] = {arithmetic.error.empty() ? 0u : 1u, arithmetic.outside_exact_set.empty() ? 0u : 1u};
+    out["probe_words"] = {arithmetic.error.empty() ? 0u : 1u};
+    for (const Domain& d : kDomains) {
+        const std::vector<float> x = arguments(d, count);
+        std::vector<float> y;
+        TestRandom random(8);
+        for (const float v : x) y.push_back(d.f == MathFunction::erf_between ? v + 2 : static_cast<float>(random.spread(1e-3, 1e3)));
+        keep(out, std::string("probe_math ") + d.name, probe.math(d.f, x, y));
+    }
+
+    TestRandom random(11), depths(12);
+    std::vector<Probe::Words> counters(count), keys(count);
+    for (std::size_t i = 0; i < count; ++i)
+        for (int k = 0; k < 4; ++k) counters[i].v[k] = random.word(), keys[i].v[k] = random.word();
+    keep(out, "probe_philox", probe.philox(counters, keys));
+    keep(out, "probe_primitive_bits", probe.primitive_bits(3, 17, 19, count));
+    for (const device::uint kind : {PHASE_ISOTROPIC, PHASE_HENYEY_GREENSTEIN, PHASE_RAYLEIGH})
+        for (const float g : {0.0f, 0.9f, -0.4f}) keep(out, fmt::format("probe_phase {} {}", kind, g), probe.phases(kind, g, {0.48f, 0.6f, 0.64f}, 5, count));
+
+    // A group of overlapping ellipsoids for each ray.
+    const std::vector<float> groups = packed(everything(false), {"decomposition", "analytic", "auto", "newton", "bvh"}).groups;
+    std::vector<float> in;
+    std::vector<ProbeGroupRay> rays;
+    for (const ProbeRay& r : random_rays(count, 9, 0.5)) {
+        ProbeGroupRay g;
+        std::copy_n(r.origin, 3, g.origin);
+        std::copy_n(r.direction, 3, g.direction);
+        g.t1 = r.t_end;
+        g.tau = static_cast<float>(depths.spread(1e-3, 10));
+        rays.push_back(g);
+        const std::size_t at = in.size() % groups.size();
+        in.insert(in.end(), groups.begin() + static_cast<std::ptrdiff_t>(at), groups.begin() + static_cast<std::ptrdiff_t>(at + CLUME_GROUP_FLOATS));
+    }
+    for (const device::uint family : {FAMILY_GAUSSIAN, FAMILY_EPANECHNIKOV, FAMILY_UNIFORM})
+        for (const bool quadratic : {false, true}) keep(out, fmt::format("probe_group {} {}", family, quadratic), probe.groups(rays, in, family, 6.25f, quadratic));
+    // Its sums over lanes are for timing alone: their order is the width's.
+    if (probe.width() == 16) keep(out, "probe_group_work", probe.group_work(GroupWork::flight, rays, groups, FAMILY_GAUSSIAN, 6.25f).values);
+    return out;
+}
+
+Outputs run_method(const DeviceInfo& device, int width, const Scene& scene, const Pair& pair, std::size_t count, std::uint32_t spp) {
+    Outputs out;
+    const DeviceScene s = packed(scene, pair);
+    const std::string name = pair.name();
+    if (count > 0) {
+        Probe probe(device, s, width);
+        const std::vector<ProbeRay> rays = random_rays(count, 21);
+        keep(out, "probe_ray flight " + name, probe.flights(rays, 1).values);
+        keep(out, "probe_ray transmittance " + name, probe.transmittances(rays).values);
+        keep(out, "probe_ray estimate " + name, probe.estimated_transmittances(rays, 2).values);
+        keep(out, "probe_ray roulette " + name, probe.roulette_transmittances(rays, 3).values);
+        for (device::uint g = 0; g < scene.grids.size(); ++g) keep(out, fmt::format("probe_grid {} {}", g, name), probe.grid(rays, g).values);
+        std::vector<std::uint32_t> pixels(16 * 16);
+        for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<std::uint32_t>(i);
+        keep(out, "probe_camera " + name, probe.camera_rays(pixels, 1));
+    }
+    const DeviceImage image = render_device(scene, s, spp, device, width);
+    std::vector<std::uint32_t>& words = out[fmt::format("render {} spp {}", spp, name)];
+    for (const FilmSums::Pixel& p : image.values)
+        for (const double v : {p.mean[0], p.mean[1], p.mean[2], p.alpha}) {
+            const auto b = std::bit_cast<std::uint64_t>(v);
+            words.push_back(static_cast<std::uint32_t>(b));
+            words.push_back(static_cast<std::uint32_t>(b >> 32));
+        }
+    return out;
+}
+
+}  // namespace clume::test
