@@ -94,7 +94,7 @@ void compare_paths(Session& session, const std::string& name, Scene scene, int t
     std::string strategy;
     // The first two rounds warm up and find out how many samples fill a round.
     for (int round = -2; round < session.rounds(7); ++round) {
-        const auto seed = static_cast<std::uint64_t>(round + 2);
+        const auto seed = static_cast<std::uint64_t>(round) + 2;
         const double before = cpu_now();
         const auto image = host.trace(host_spp, seed, threads);
         const double host_cpu = cpu_now() - before;
@@ -141,7 +141,7 @@ void compare_flights(Session& session, const std::string& name, const Scene& bas
     double host_collided = 0, collided = 0, host_flights = 0, flights = 0;
     for (int round = -2; round < session.rounds(7); ++round) {
         const double before = cpu_now();
-        const auto rate = host.free_flights(host_count, inside, static_cast<std::uint64_t>(round + 2), threads);
+        const auto rate = host.free_flights(host_count, inside, static_cast<std::uint64_t>(round) + 2, threads);
         const double host_cpu = cpu_now() - before, host_s = static_cast<double>(rate.flights) / rate.flights_per_s;
         double device_s = 0, cpu_s = 0;
         for (std::uint32_t i = 0; i < launches; ++i, ++sample) {
