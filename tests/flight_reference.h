@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "src/bvh.h"
@@ -269,6 +270,23 @@ inline FlightP flight_p(Probe& probe, const FlightLaw& law, const ProbeRay& r, s
 inline FlightP flight_p(Probe& probe, const std::vector<Ellipsoid>& ellipsoids, const ProbeRay& r, std::size_t count, std::uint32_t sample, bool with_winner = true) {
     return flight_p(probe, FlightLaw(ellipsoids, r, 24), r, count, sample, with_winner);
 }
+
+/// Escape masses of many rays, by what let them fly: together they see 1 % of density, which none does alone.
+struct EscapeMass {
+    std::map<std::string, std::pair<double, double>> sums;  ///< of z, and terms
+
+    void add(const std::string& what, const FlightP& p) {
+        sums[what].first += p.escape_z;
+        sums[what].second += 1;
+    }
+    /// Fails by chance with probability 1e-4.
+    void check() const {
+        for (const auto& [what, z] : sums) {
+            INFO(what << ": escape mass off by " << z.first / std::sqrt(z.second) << " standard deviations");
+            CHECK(reference::z_test_p(z.first / std::sqrt(z.second)) > reference::sidak_threshold(1e-4, sums.size()));
+        }
+    }
+};
 
 inline const ProbeRay kFlightRays[] = {ray({0.3, -0.2, -3}, {-0.08, 0.07, 1}), ray({0.05, 0.02, -0.03}, {0.3, -0.9, 0.2}), ray({-0.11, 3, 0.06}, {-0.0, -1, 0.0})};
 

@@ -93,6 +93,7 @@ TEST_CASE("Strategies.FlightsFollowTheMixture", "[kernels]") {
     const std::pair<const char*, std::vector<KernelFamily>> families[] = {{"gaussian", {kGaussian}}, {"mixed", kMixed}};
     const Pair pairs[] = {{"regular"}, {"regular", "analytic", "auto", 0, "bisection"}, {"delta", "analytic", "scene"}, {"delta", "analytic", "grid", 7}, {"delta", "analytic", "grid"}, {"progressive"}};
     std::vector<std::pair<std::string, FlightP>> results;
+    EscapeMass escape;
     // Of three families at least three, so that one program has them all.
     for (const auto& [name, kernels] : families)
         for (const std::size_t n : {std::size_t{1}, std::max<std::size_t>(2, kernels.size()), std::size_t{50}}) {
@@ -107,8 +108,11 @@ TEST_CASE("Strategies.FlightsFollowTheMixture", "[kernels]") {
                 if (std::string(pair.strategy) == "progressive")
                     scene.learned.assign(scene.learned.size(), 1.05f * static_cast<float>(scene_bound(scene.ellipsoids, build_bvh(scene.ellipsoids))));
                 Probe probe(test_device(), scene);
-                for (std::uint32_t k = 0; k < std::size(kFlightRays); ++k)
-                    results.emplace_back(fmt::format("{} of {}, {}, ray {}", n, name, pair.name(), k), flight_p(probe, laws[k], kFlightRays[k], 20000, k, n > 1));
+                for (std::uint32_t k = 0; k < std::size(kFlightRays); ++k) {
+                    const FlightP p = flight_p(probe, laws[k], kFlightRays[k], 40000, k, n > 1);
+                    results.emplace_back(fmt::format("{} of {}, {}, ray {}", n, name, pair.name(), k), p);
+                    escape.add(pair.name(), p);
+                }
             }
         }
     const double threshold = reference::sidak_threshold(1e-4, 2 * results.size());
@@ -117,6 +121,7 @@ TEST_CASE("Strategies.FlightsFollowTheMixture", "[kernels]") {
         CHECK(p.t > threshold);
         CHECK(p.winner > threshold);
     }
+    escape.check();
 }
 
 TEST_CASE("Strategies.BiasedOnesAreFoundBiased", "[kernels]") {
