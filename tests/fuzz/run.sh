@@ -33,8 +33,8 @@ fuzz() {
     local corpus=$build/corpus/$target crash=$build/crashes/$target-
     mkdir -p "$corpus" "$build/crashes"
     if [[ -f $build/seeds/$target.dict ]]; then options+=("-dict=$build/seeds/$target.dict"); fi
-    # The slowest inputs, all the tiles there may be, take a second or two by themselves.
-    if ! "$build/tests/fuzz/fuzz_$target" "$corpus" "$build/seeds/$target" "${options[@]}" -max_total_time="$seconds" -timeout=60 -report_slow_units=60 \
+    # The slowest inputs, half a gigabyte of tiles, take a second or two by themselves, and a minute on a machine that is busy.
+    if ! "$build/tests/fuzz/fuzz_$target" "$corpus" "$build/seeds/$target" "${options[@]}" -max_total_time="$seconds" -timeout=300 -report_slow_units=300 \
         -rss_limit_mb=6000 -artifact_prefix="$crash" -print_final_stats=1 >"$build/$target.log" 2>&1; then
         say "fuzzing $target failed; the end of $build/$target.log:"
         tail -n 40 "$build/$target.log" >&2
