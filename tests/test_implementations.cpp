@@ -159,7 +159,7 @@ TEST_CASE("Implementations.ThePilotChoosesTheSame", "[.][implementations]") {
     }
 }
 
-TEST_CASE("EntryPoints.AreAllRun", "[entry]") {
+TEST_CASE("EntryPoints.AreAllRun", "[.][entry]") {
     // Under a checker of memory, races and uninitialised values (./clume test --deep) this is the program checked, so it is tiny.
     const DeviceInfo device = select_devices({}).front();
     Outputs all = run_building_blocks(device, 4, 8);
