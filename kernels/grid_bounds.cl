@@ -19,6 +19,7 @@ static bool bounds_enter(CellWalk* w, __global const GridInfo* grid, float3 o, f
     w->entry.link = CELL_EMPTY_MAX;
     w->entry.majorant = grid->bound;
     w->entry.reference = 0u;
+    w->entry.count = 0u;
     return grid->bound > 0.0f;
 #else
     const float scale = grid->bounds_scale;
