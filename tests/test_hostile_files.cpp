@@ -64,6 +64,21 @@ std::string exr_head(int width, int height, const std::string& more = "", int ch
            attribute("screenWindowWidth", "float", std::string("\0\0\x80\x3f", 4)) + more + '\0';
 }
 
+/// White, half, deflated.
+void write_flat_exr(const std::filesystem::path& path, int width, int height) {
+    Imf::Header header(width, height);
+    header.compression() = Imf::ZIP_COMPRESSION;
+    std::vector<std::uint16_t> line(static_cast<std::size_t>(width), 0x3c00);
+    Imf::FrameBuffer frame;
+    for (const char* channel : {"R", "G", "B"}) {
+        header.channels().insert(channel, Imf::Channel(Imf::HALF));
+        frame.insert(channel, Imf::Slice(Imf::HALF, reinterpret_cast<char*>(line.data()), 2, 0));
+    }
+    Imf::OutputFile file(path.string().c_str(), header);
+    file.setFrameBuffer(frame);
+    file.writePixels(height);
+}
+
 }  // namespace
 
 TEST_CASE("HostileFiles.ClaimsCostNothing", "[quick]") {
@@ -126,22 +141,20 @@ TEST_CASE("HostileFiles.ClaimsCostNothing", "[quick]") {
 TEST_CASE("HostileFiles.AFlatImageIsStillRead", "[quick]") {
     // Deflate makes a thousandth of it: the bound must allow that.
     const TempFolder folder;
-    const std::string path = (folder.path() / "flat.exr").string();
-    Imf::Header header(4096, 2048);
-    header.compression() = Imf::ZIP_COMPRESSION;
-    std::vector<std::uint16_t> line(4096, 0x3c00);
-    Imf::FrameBuffer frame;
-    for (const char* channel : {"R", "G", "B"}) {
-        header.channels().insert(channel, Imf::Channel(Imf::HALF));
-        frame.insert(channel, Imf::Slice(Imf::HALF, reinterpret_cast<char*>(line.data()), 2, 0));
-    }
-    {
-        Imf::OutputFile file(path.c_str(), header);
-        file.setFrameBuffer(frame);
-        file.writePixels(2048);
-    }
-    CHECK(std::filesystem::file_size(path) < 100'000);
-    CHECK(read_environment(path).rgb.back() == 1);
+    write_flat_exr(folder.path() / "flat.exr", 4096, 2048);
+    CHECK(std::filesystem::file_size(folder.path() / "flat.exr") < 100'000);
+    CHECK(read_environment(folder.path() / "flat.exr").rgb.back() == 1);
+}
+
+TEST_CASE("Binary.AFileNamedOftenIsHeldWithinTheLimit") {
+    const SceneFolder folder;
+    write_flat_exr(folder.path / "flat.exr", 1024, 512);
+    std::string lights;
+    for (int i = 0; i < 100; ++i) lights += std::string(i == 0 ? "" : ",") + R"({"type":"envmap","file":"flat.exr"})";
+    std::ofstream(folder.path / "often.json") << R"({"camera":{"origin":[0,0,-4],"target":[0,0,0]},"lights":[)" << lights << "]}";
+    Process process({"render", "often.json", "--memory-limit", "400M", "--quiet"}, folder.path);
+    CHECK(process.wait() == 3);
+    CHECK_THAT(process.err, Catch::Contains("the files up to here hold"));
 }
 
 TEST_CASE("HostileFiles.HeadersOfManyNamesTakeNoTime", "[quick]") {
