@@ -27,7 +27,7 @@ struct SceneBuffers {
           texels(queue, scene.texels),
           alias(queue, scene.alias),
           learned(queue, scene.learned),
-          raised(queue, std::vector<device::uint>(scene.learned.size())),
+          raised(queue, std::vector<device::uint>(scene.learned.size()), CL_MEM_READ_WRITE),
           grids(queue, scene.grids),
           grid_cells(queue, scene.grid_cells),
           grid_values(queue, scene.grid_values) {}
