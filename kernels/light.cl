@@ -178,18 +178,19 @@ static bool light_sample(float3 o, uint4 bits, uint4 more, LightSample* s, __con
 #if CLUME_NEE & LIGHT_ENVMAP
     if (kind == LIGHT_ENVMAP) {
         const uint count = lights[i].width * lights[i].height, offset = lights[i].texel_offset;
-        uint texel = uniform_index(bits.y, count);
+        uint texel = uniform_index_s(bits.y, count);
         if (bits.z >= alias[offset + texel].threshold) texel = alias[offset + texel].other;
         const uint row = texel / lights[i].width, column = texel - row * lights[i].width;
         // Uniform in the texel: lon is linear in the column; sin(lat) is uniform between the sines of the row's edges.
         const float turn = 0.5f - divide_s((float)column + uniform_s(more.x), (float)lights[i].width);
         const float inverse_height = rcp_s((float)lights[i].height);
-        const float top = sincos_turns_s(fabs(0.25f - 0.5f * (float)row * inverse_height)).x;
-        const float bottom = sincos_turns_s(fabs(0.25f - 0.5f * (float)(row + 1) * inverse_height)).x;
+        float cosine_lat, z_lon;
+        const float top = sincos_turns_s(fabs(0.25f - 0.5f * (float)row * inverse_height), &cosine_lat);
+        const float bottom = sincos_turns_s(fabs(0.25f - 0.5f * (float)(row + 1) * inverse_height), &cosine_lat);
         const float y_top = 2 * row > lights[i].height ? -top : top, y_bottom = 2 * (row + 1) > lights[i].height ? -bottom : bottom;
         const float y = fma(uniform_s(more.y), y_bottom - y_top, y_top), r = sqrt_s(max_s(fma(-y, y, 1.0f), 0.0f));
-        const float2 lon = sincos_turns_s(turn < 0.0f ? turn + 1.0f : turn);
-        const float x = r * lon.x, z = r * lon.y, sine = lights[i].axis.x, cosine = lights[i].axis.y;
+        const float x_lon = sincos_turns_s(turn < 0.0f ? turn + 1.0f : turn, &z_lon);
+        const float x = r * x_lon, z = r * z_lon, sine = lights[i].axis.x, cosine = lights[i].axis.y;
         s->direction = normalize_s((float3)(fma(cosine, x, sine * z), y, fma(cosine, z, -(sine * x))));
         s->pdf = select_pdf * alias[offset + texel].pdf_texel;
         s->value = to_spectrum(texels[offset + texel]) * rcp_s(s->pdf);

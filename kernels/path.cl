@@ -69,12 +69,34 @@ static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws*
     uint blocker;
     surfaces_nearest(x, s.direction, s.distance, s.light, &blocker, params, lights);
     if (blocker != NO_LIGHT) return (spectrum)0.0f;
-    const float value = phase_value(phase, g, phase_versine(g, d, s.direction));
+    const float value = phase_value_s(phase, g, phase_versine(g, d, s.direction));
     const float weight = (lights[s.light].kind & CLUME_HITS) ? divide_s(s.pdf, s.pdf + value) : 1.0f;
     return s.value * (value * weight * transmittance_estimate(x, s.direction, s.distance, bits.w, r, flight, SCENE));
 #else
     return (spectrum)0.0f;
 #endif
+}
+
+/// What a ray that escapes finds.
+static spectrum path_background(float3 d, float phase_pdf, uint depth, __constant const RenderParams* params, __global const LightInfo* lights, __global const float4* texels, __global const AliasEntry* alias) {
+#if LIGHT_ENVIRONMENTS && ((CLUME_LIGHTS & CLUME_HITS) || CLUME_VISIBLE_BACKGROUND)
+    return environment_radiance(d, phase_pdf, depth == 0, params, lights, texels, alias);
+#else
+    return (spectrum)0.0f;
+#endif
+}
+
+/// What a ray that ends at t on an opaque surface finds, weighted against next-event estimation.
+static spectrum path_surface(uint surface, float3 o, float3 d, float t, float phase_pdf, uint depth, __global const LightInfo* lights) {
+#if LIGHT_SURFACES
+    const uint kind = lights[surface].kind;
+    if ((depth == 0 || (kind & CLUME_HITS)) && surface_emits(surface, o, d, lights)) {
+        const float other = depth > 0 && (kind & CLUME_NEE) ? surface_pdf(surface, o, d, t, lights) : 0.0f;
+        const float weight = depth > 0 ? divide_s(phase_pdf, phase_pdf + other) : 1.0f;
+        return to_spectrum(lights[surface].radiance) * weight;
+    }
+#endif
+    return (spectrum)0.0f;
 }
 
 /// One event; afterwards the path is alive, paused in its flight (still alive), or ended with its radiance complete.
@@ -91,20 +113,11 @@ static void path_event(Path* p, uint pixel, SCENE_ARGS) {
     if (result == FLIGHT_ESCAPED) {
         p->flags &= ~PATH_ALIVE;
         if (surface == NO_LIGHT) {
-#if LIGHT_ENVIRONMENTS && ((CLUME_LIGHTS & CLUME_HITS) || CLUME_VISIBLE_BACKGROUND)
-            p->radiance += p->beta * environment_radiance(p->d, p->phase_pdf, p->depth == 0, params, lights, texels, alias);
-#endif
-            return;
+            p->radiance += p->beta * path_background(p->d, p->phase_pdf, p->depth, params, lights, texels, alias);
+        } else {
+            if (p->depth == 0) p->flags |= PATH_ALPHA;
+            p->radiance += p->beta * path_surface(surface, p->o, p->d, t_end, p->phase_pdf, p->depth, lights);
         }
-#if LIGHT_SURFACES
-        if (p->depth == 0) p->flags |= PATH_ALPHA;
-        const uint kind = lights[surface].kind;
-        if ((p->depth == 0 || (kind & CLUME_HITS)) && surface_emits(surface, p->o, p->d, lights)) {
-            const float other = p->depth > 0 && (kind & CLUME_NEE) ? surface_pdf(surface, p->o, p->d, t_end, lights) : 0.0f;
-            const float weight = p->depth > 0 ? divide_s(p->phase_pdf, p->phase_pdf + other) : 1.0f;
-            p->radiance += p->beta * to_spectrum(lights[surface].radiance) * weight;
-        }
-#endif
         return;
     }
     if (p->depth == 0) p->flags |= PATH_ALPHA;

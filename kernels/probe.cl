@@ -160,5 +160,5 @@ __kernel void probe_phase(uint kind, float g, float3 d, uint seed, __global floa
     const uint4 bits = philox((uint4)(i, 0, 0, 0), (uint2)(seed, 1));
     float pdf;
     const float3 s = phase_sample(kind, g, d, bits, &pdf);
-    out[i] = (float4)(dot_s(s, d), pdf, phase_value(kind, g, phase_versine(g, d, s)), dot_s(s, s));
+    out[i] = (float4)(dot_s(s, d), pdf, phase_value_s(kind, g, phase_versine(g, d, s)), dot_s(s, s));
 }

@@ -1,8 +1,21 @@
 // SPDX-License-Identifier: MIT
-// Entry point: each work-item renders a share of one pixel's samples and adds them to its own sums. After
-// CLUME_LAUNCH_EVENTS events it saves its path, counts itself in `unfinished`, and goes on in the next launch.
-#include "path.cl"
+// Entry point. A row of sums gathers a share of one pixel's samples; a work-item renders a row's, one after the other, or, with
+// CLUME_LANES, those of CLUME_WIDTH rows side by side: lanes take the next sample of any of them as they come free. After
+// CLUME_LAUNCH_EVENTS events (a lane) it saves its paths, counts itself in `unfinished`, and goes on in the next launch.
+#include "lane_path.cl"
 
+/// Adds what a work-item has gathered for one row of sums to what earlier launches left there, if any.
+static void sums_add(__global ulong* out, const ulong* sum, uint resume) {
+    for (int i = 0; i < FILM_WORDS; ++i) {
+        // 128-bit sums carry from their even to their odd word; the counters that follow stand alone.
+        const ulong old = resume ? out[i] : 0;
+        ulong carry = 0;
+        if (i < FILM_ALPHA && (i & 1)) carry = out[i - 1] < sum[i - 1] ? 1 : 0;
+        out[i] = old + sum[i] + carry;
+    }
+}
+
+#if !CLUME_LANES
 __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState* states, __global ulong* sums,
                      __global uint* unfinished, uint pixel_first, uint pixel_count, uint splits, uint sample_begin, uint sample_end, uint resume) {
     const uint item = (uint)get_global_id(0);
@@ -73,12 +86,128 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
         states[item].sample = p.sample;
         states[item].flags = 0;
     }
-    __global ulong* out = sums + (size_t)item * FILM_WORDS;
-    for (int i = 0; i < FILM_WORDS; ++i) {
-        // 128-bit sums carry from their even to their odd word; the counters that follow stand alone.
-        const ulong old = resume ? out[i] : 0;
-        ulong carry = 0;
-        if (i < FILM_ALPHA && (i & 1)) carry = out[i - 1] < sum[i - 1] ? 1 : 0;
-        out[i] = old + sum[i] + carry;
+    sums_add(sums + (size_t)item * FILM_WORDS, sum, resume);
+}
+#else
+/// Gives the lanes in *idle a sample each, while there are any.
+static vint lanes_assign(Lanes* l, vint idle, uint* next, uint last, uint first_row, uint rows, uint pixel_count, uint splits, uint sample_begin, uint sample_end,
+                         __global const uint* pixels) {
+    vint begun = (vint)0;
+    for (uint i = 0; i < rows; ++i) {
+        if (!LANE_OF(int, idle, i)) continue;
+        while (*next < last) {
+            const uint row = *next % rows, item = first_row + row, sample = sample_begin + item / pixel_count + *next / rows * splits;
+            *next += 1;
+            if (sample >= sample_end) continue;
+            ((uint*)&l->row)[i] = row;
+            ((uint*)&l->draws.sample)[i] = sample;
+            ((uint*)&l->draws.pixel)[i] = pixels[item % pixel_count];
+            ((int*)&begun)[i] = -1;
+            break;
+        }
+    }
+    return begun;
+}
+
+static void lanes_resume(Lanes* l, uint i, const PathState* s) {
+    ((float*)&l->flight.ox)[i] = s->origin.x;
+    ((float*)&l->flight.oy)[i] = s->origin.y;
+    ((float*)&l->flight.oz)[i] = s->origin.z;
+    ((float*)&l->flight.t)[i] = s->origin.w;
+    ((float*)&l->flight.dx)[i] = s->direction.x;
+    ((float*)&l->flight.dy)[i] = s->direction.y;
+    ((float*)&l->flight.dz)[i] = s->direction.z;
+    ((float*)&l->phase_pdf)[i] = s->direction.w;
+    for (int k = 0; k < CLUME_CHANNELS; ++k) {
+        ((float*)(l->beta + k))[i] = PARAM_CHANNEL(s->beta, k);
+        ((float*)(l->radiance + k))[i] = PARAM_CHANNEL(s->radiance, k);
+    }
+    ((uint*)&l->draws.sample)[i] = s->sample;
+    ((uint*)&l->draws.depth)[i] = s->depth;
+    ((uint*)&l->flight.draw)[i] = s->draw;
+    ((uint*)&l->row)[i] = s->row;
+    ((int*)&l->alive)[i] = (s->flags & PATH_ALIVE) ? -1 : 0;
+    ((int*)&l->alpha)[i] = (s->flags & PATH_ALPHA) ? -1 : 0;
+}
+
+static void lanes_save(const Lanes* l, uint i, uint next, PathState* s) {
+    const LaneFlights* f = &l->flight;
+    s->origin = (float4)(lane_origin(f, i), LANE_OF(float, f->t, i));
+    s->direction = (float4)(lane_direction(f, i), LANE_OF(float, l->phase_pdf, i));
+    s->beta = (float4)(LANE_OF(float, l->beta[0], i), LANE_OF(float, l->beta[CLUME_CHANNELS / 2], i), LANE_OF(float, l->beta[CLUME_CHANNELS - 1], i), 0.0f);
+    s->radiance = (float4)(LANE_OF(float, l->radiance[0], i), LANE_OF(float, l->radiance[CLUME_CHANNELS / 2], i), LANE_OF(float, l->radiance[CLUME_CHANNELS - 1], i), 0.0f);
+    s->sample = LANE_OF(uint, l->draws.sample, i);
+    s->depth = LANE_OF(uint, l->draws.depth, i);
+    s->draw = LANE_OF(uint, f->draw, i);
+    s->flags = (LANE_OF(int, l->alive, i) ? PATH_ALIVE : 0u) | (LANE_OF(int, l->alpha, i) ? PATH_ALPHA : 0u);
+    s->row = LANE_OF(uint, l->row, i);
+    s->next = next;
+}
+
+__kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState* states, __global ulong* sums,
+                     __global uint* unfinished, uint pixel_first, uint pixel_count, uint splits, uint sample_begin, uint sample_end, uint resume) {
+    const uint first_row = (uint)get_global_id(0) * CLUME_WIDTH;
+    if (first_row >= pixel_count * splits) return;
+    const uint rows = min((uint)CLUME_WIDTH, pixel_count * splits - first_row);
+    const uint last = rows * ((sample_end - sample_begin + splits - 1) / splits);
+    uint next = 0;
+    Lanes l;
+    l.alive = l.alpha = l.under_way = (vint)0;
+    l.result = (vint)FLIGHT_ESCAPED;
+    l.row = l.draws.sample = l.draws.pixel = l.draws.depth = (vuint)0u;
+    l.draws.seed = (uint2)(params->seed_lo, params->seed_hi);
+    l.violations = 0;
+    l.excess = 0;
+    if (resume) {
+        next = states[first_row].next;
+        for (uint i = 0; i < rows; ++i) {
+            const PathState s = states[first_row + i];
+            lanes_resume(&l, i, &s);
+            ((uint*)&l.draws.pixel)[i] = pixels[pixel_first + (first_row + s.row) % pixel_count];
+        }
+    }
+    ulong sum[CLUME_WIDTH * FILM_WORDS];
+    for (uint i = 0; i < CLUME_WIDTH * FILM_WORDS; ++i) sum[i] = 0;
+    int events = 0;
+    vint waiting = l.alive, out = (vint)0;  // paths about to fly; paths flying, or at the end of a flight
+    for (;;) {
+        const bool tired = events >= CLUME_LAUNCH_EVENTS * CLUME_WIDTH;
+        if (!tired) {
+            if (next < last && vany(~l.alive)) {
+                const vint begun = lanes_assign(&l, ~l.alive, &next, last, first_row, rows, pixel_count, splits, sample_begin, sample_end, pixels + pixel_first);
+                lanes_start(&l, begun, params);
+                waiting |= begun;
+            }
+            lanes_depart(&l, waiting, params, cells, lights);
+            out |= waiting;
+            waiting = (vint)0;
+        }
+        if (!vany(out)) break;
+        const int busy = lanes_count(l.under_way);
+        if (busy > 0) lanes_fly(&l.flight, &l.draws, &l.under_way, &l.result, tired ? 0 : busy * CLUME_LANES_ENOUGH / 16, &l.violations, SCENE);
+        const vint ended = out & ~l.under_way;
+        out = l.under_way;
+        events += lanes_count(ended);
+        const vint escaped = ended & (l.result == (vint)FLIGHT_ESCAPED), collided = ended & (l.result == (vint)FLIGHT_COLLIDED);
+        if (vany(escaped)) lanes_escape(&l, escaped, SCENE);
+        if (vany(collided)) lanes_collide(&l, collided, SCENE);
+        waiting |= ended & l.alive;
+        const vint over = ended & ~l.alive;
+        for (int i = 0; i < CLUME_WIDTH; ++i) {
+            if (!LANE_OF(int, over, i)) continue;
+            ulong* s = sum + LANE_OF(uint, l.row, i) * FILM_WORDS;
+            film_sample(s, LANE_SPECTRUM(l.radiance, i), params->film_scale);
+            s[FILM_ALPHA] += LANE_OF(int, l.alpha, i) ? 1 : 0;
+        }
+    }
+    sum[FILM_VIOLATIONS] = l.violations;
+    sum[FILM_EXCESS] = l.excess;
+    if (vany(l.alive) || next < last) atomic_inc(unfinished);
+    for (uint i = 0; i < rows; ++i) {
+        PathState s;
+        lanes_save(&l, i, next, &s);
+        states[first_row + i] = s;
+        sums_add(sums + (size_t)(first_row + i) * FILM_WORDS, sum + i * FILM_WORDS, resume);
     }
 }
+#endif

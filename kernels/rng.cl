@@ -15,26 +15,18 @@
 #define DRAW_LIGHT_MORE 0xf0000004u
 #define DRAW_SHADOW 0x40000000u  // and on: transmittance estimates
 
-/// 128 random bits; counter = (sample, pixel, depth, draw), key = seed. 64-bit products: some mul_hi are slow.
+#include "scalar.inc.cl"
+#include "rng_body.inc.cl"
+#include "body_end.inc.cl"
+#include "vector.inc.cl"
+#include "rng_body.inc.cl"
+#include "body_end.inc.cl"
+
 static uint4 philox(uint4 counter, uint2 key) {
-    uint x = counter.x, y = counter.y, z = counter.z, w = counter.w, a = key.x, b = key.y;
-    for (int round = 0; round < 7; ++round) {
-        const ulong p = (ulong)x * 0xD2511F53u, q = (ulong)z * 0xCD9E8D57u;
-        x = (uint)(q >> 32) ^ y ^ a;
-        y = (uint)q;
-        z = (uint)(p >> 32) ^ w ^ b;
-        w = (uint)p;
-        a += 0x9E3779B9u;
-        b += 0xBB67AE85u;
-    }
+    uint x = counter.x, y = counter.y, z = counter.z, w = counter.w;
+    philox_s(&x, &y, &z, &w, key);
     return (uint4)(x, y, z, w);
 }
-
-/// floor(x · n / 2^32): uniform in [0, n) for 32 random bits, to within n 2^-32.
-static uint uniform_index(uint x, uint n) { return (uint)(((ulong)x * n) >> 32); }
-
-/// Uniform in (0, 1): (x + 1/2) 2^-32 rounded to float, kept below 1; error < 1.3e-7 relative.
-static float uniform_s(uint x) { return min_s((from_uint_s(x) + 0.5f) * 0x1p-32f, 0x1.fffffep-1f); }
 
 /// 32 random bits per primitive id under a 64-bit key: a bijective mixer (three multiply-xorshift rounds). Keys are words of
 /// `philox`; ones that differ in a bit of y alone would not do.

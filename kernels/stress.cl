@@ -48,7 +48,8 @@ __kernel void stress_naive(__global const float* groups, __global const float4* 
             const float whole = a * ((v0 - v0 * v0 * v0 * 0.333333333f) - zero) + tau;
             const float q = 1.5f * (zero + divide_s(whole, max_s(a, 0x1p-90f)));
             if (q < 1.0f && q > -1.0f) {
-                const float v = 2.0f * sincos_turns_s(fabs(asin_s(q)) * (CLUME_INV_2PI / 3.0f)).x;
+                float cosine;
+                const float v = 2.0f * sincos_turns_s(fabs(asin_s(q)) * (CLUME_INV_2PI / 3.0f), &cosine);
                 flight = divide_s(h * copysign(v, q) - s0, w);
             }
         }
@@ -69,7 +70,7 @@ __kernel void stress_phase(__global const float4* d_g, __global const float* ver
     float pdf;
     const float3 s = phase_sample(kind, d_g[i].w, d_g[i].xyz, bits[i], &pdf);
     out[i] = (float4)(s, pdf);
-    value[i] = phase_value(kind, d_g[i].w, versine[i]);
+    value[i] = phase_value_s(kind, d_g[i].w, versine[i]);
 }
 
 /// Camera rays through film points: in: x, y (as_uint), u, v; out as probe_ray takes them.

@@ -103,7 +103,7 @@ bool finite(std::initializer_list<float> values) {
 }
 
 void stress_phases(StressDevice& device, const StressOptions& options, StressResult& result) {
-    const Limit value_limit = stated_limit("phase.cl", "phase_value"), direction_limit = stated_limit("phase.cl", "phase_sample", "direction"), pdf_limit = stated_limit("phase.cl", "phase_sample", "pdf");
+    const Limit value_limit = stated_limit("phase_body.inc.cl", "FN(phase_value)"), direction_limit = stated_limit("phase_body.inc.cl", "FN(phase_sample)", "direction"), pdf_limit = stated_limit("phase_body.inc.cl", "FN(phase_sample)", "pdf");
     const std::size_t n = options.quick ? 500 : 20000;
     StressRandom random(31);
     for (const PhaseFamily& f : kPhases) {
@@ -135,9 +135,9 @@ void stress_phases(StressDevice& device, const StressOptions& options, StressRes
                 values[i].at = pdfs[i].at = at;
             }
         });
-        result.rows.push_back(stress_row("phase function", "phase_value", f.name, value_limit, values, options));
-        result.rows.push_back(stress_row("phase sampling: direction", "phase_sample", f.name, direction_limit, sampled, options));
-        result.rows.push_back(stress_row("phase sampling: density", "phase_sample", f.name, pdf_limit, pdfs, options));
+        result.rows.push_back(stress_row("phase function", "FN(phase_value)", f.name, value_limit, values, options));
+        result.rows.push_back(stress_row("phase sampling: direction", "FN(phase_sample)", f.name, direction_limit, sampled, options));
+        result.rows.push_back(stress_row("phase sampling: density", "FN(phase_sample)", f.name, pdf_limit, pdfs, options));
     }
 }
 
