@@ -110,6 +110,9 @@
 #ifndef CLUME_LANES_ENOUGH  // sixteenths of the flights under way that are left when those that ended are looked after
 #define CLUME_LANES_ENOUGH 10
 #endif
+#ifndef CLUME_LANES_STEPPING  // sixteenths of the flights under way that may be between cells while the others collide
+#define CLUME_LANES_STEPPING 8
+#endif
 
 #define CONCAT_(a, b) a##b
 #define CONCAT(a, b) CONCAT_(a, b)
@@ -134,6 +137,16 @@ typedef CONCAT(float, CLUME_WIDTH) vfloat;
 typedef CONCAT(int, CLUME_WIDTH) vint;
 typedef CONCAT(uint, CLUME_WIDTH) vuint;
 typedef CONCAT(ulong, CLUME_WIDTH) vulong;
+#if CLUME_WIDTH == 16
+#define CLUME_HALF_WIDTH 8
+#elif CLUME_WIDTH == 8
+#define CLUME_HALF_WIDTH 4
+#else
+#define CLUME_HALF_WIDTH 2
+#endif
+typedef CONCAT(ulong, CLUME_HALF_WIDTH) vpairs;  // the bits of a vuint, two lanes each (even lanes: low words)
+#define as_vpairs(x) CONCAT(as_ulong, CLUME_HALF_WIDTH)(x)
+#define pairs_as_vuint(x) CONCAT(as_uint, CLUME_WIDTH)(x)
 #define vselect(a, b, mask) select((a), (b), (mask))
 #define vany(mask) any(mask)
 #define as_vint(x) CONCAT(as_int, CLUME_WIDTH)(x)

@@ -15,6 +15,22 @@
 #define DRAW_LIGHT_MORE 0xf0000004u
 #define DRAW_SHADOW 0x40000000u  // and on: transmittance estimates
 
+/// x · factor: its upper and lower words. 64-bit products, those of a vector by even and odd lanes: mul_hi is slow on some devices.
+static void product_s(uint x, uint factor, uint* high, uint* low) {
+    const ulong p = (ulong)x * factor;
+    *high = (uint)(p >> 32);
+    *low = (uint)p;
+}
+static void product_v(vuint x, uint factor, vuint* high, vuint* low) {
+#if CLUME_WIDTH == 1
+    product_s(x, factor, high, low);
+#else
+    const vpairs both = as_vpairs(x), even = (both & (vpairs)0xffffffffu) * (vpairs)factor, odd = (both >> (vpairs)32) * (vpairs)factor;
+    *high = pairs_as_vuint((even >> (vpairs)32) | (odd & (vpairs)0xffffffff00000000u));
+    *low = pairs_as_vuint((even & (vpairs)0xffffffffu) | (odd << (vpairs)32));
+#endif
+}
+
 #include "scalar.inc.cl"
 #include "rng_body.inc.cl"
 #include "body_end.inc.cl"

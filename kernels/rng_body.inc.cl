@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: MIT
 // Included twice by rng.cl: bodies for one draw (FN(x) = x_s) and for vectors of them (x_v).
 
-/// 128 random bits in place of the counter (sample, pixel, depth, draw), key = seed. 64-bit products: some mul_hi are slow.
+/// 128 random bits in place of the counter (sample, pixel, depth, draw), key = seed.
 static void FN(philox)(VU* c0, VU* c1, VU* c2, VU* c3, uint2 key) {
     VU x = *c0, y = *c1, z = *c2, w = *c3;
     uint a = key.x, b = key.y;
     for (int round = 0; round < 7; ++round) {
-        const VL p = TO_L(x) * (VL)0xD2511F53u, q = TO_L(z) * (VL)0xCD9E8D57u;
-        x = TO_U(q >> (VL)32) ^ y ^ (VU)a;
-        y = TO_U(q);
-        z = TO_U(p >> (VL)32) ^ w ^ (VU)b;
-        w = TO_U(p);
+        VU p_high, p_low, q_high, q_low;
+        FN(product)(x, 0xD2511F53u, &p_high, &p_low);
+        FN(product)(z, 0xCD9E8D57u, &q_high, &q_low);
+        x = q_high ^ y ^ (VU)a;
+        y = q_low;
+        z = p_high ^ w ^ (VU)b;
+        w = p_low;
         a += 0x9E3779B9u;
         b += 0xBB67AE85u;
     }
