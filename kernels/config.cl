@@ -111,7 +111,7 @@
 #define CLUME_LANES_ENOUGH 10
 #endif
 #ifndef CLUME_LANES_STEPPING  // sixteenths of the flights under way that may be between cells while the others collide
-#define CLUME_LANES_STEPPING 8
+#define CLUME_LANES_STEPPING 7
 #endif
 
 #define CONCAT_(a, b) a##b
