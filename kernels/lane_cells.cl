@@ -8,7 +8,7 @@
 #define LANE_SET(to, value, mask) to = vselect(to, value, mask)
 
 #if defined(__AVX512F__)
-typedef int GatheredWords __attribute__((__vector_size__(64)));
+typedef int ProcessorWords __attribute__((__vector_size__(64)));
 #endif
 
 /// The four words of record `index` of each lane, a word a vector.
@@ -16,7 +16,7 @@ static void lanes_load(__global const uint4* records, vuint index, vuint* a, vui
 #if CLUME_WIDTH == 16 && defined(__AVX512F__)
     // The compiler turns what follows the #else into three times the instructions that it needs: where it says that it compiles for
     // a processor with gathers of 16 words, it is told to use them.
-    const GatheredWords word = __builtin_astype(4u * index, GatheredWords);
+    const ProcessorWords word = __builtin_astype(4u * index, ProcessorWords);
     const char* base = (const char*)(size_t)records;
     *a = __builtin_astype(__builtin_ia32_gathersiv16si(word, base, word, (ushort)0xffffu, 4), uint16);
     *b = __builtin_astype(__builtin_ia32_gathersiv16si(word, base + 4, word, (ushort)0xffffu, 4), uint16);

@@ -13,7 +13,8 @@ typedef struct {
     vfloat phase_pdf;
     vfloat t_surface;         // where the ray ends
     vuint surface;            // on which light (NO_LIGHT: none)
-    vuint row;                // of the work-item's pixels
+    vuint row;                // of the work-item's sums
+    vfloat film_x, film_y;    // lower corner of the pixel, from the scene's centre
     vint alive, alpha;        // masks
     vint under_way, result;   // of the flights
     uint violations;
@@ -43,8 +44,7 @@ static void lanes_start(Lanes* l, vint mask, __constant const RenderParams* para
     vuint a, b, c, d;
     LANE_SET(l->draws.depth, (vuint)0u, mask);
     lanes_bits(&l->draws, (vuint)DRAW_CAMERA, &a, &b, &c, &d);
-    const vuint y = l->draws.pixel / (vuint)params->film_width, x = l->draws.pixel - y * params->film_width;
-    const vfloat fx = (to_vfloat(x) - params->film_cx) + uniform_v(a), fy = (to_vfloat(y) - params->film_cy) + uniform_v(b);
+    const vfloat fx = l->film_x + uniform_v(a), fy = l->film_y + uniform_v(b);
     LaneFlights* f = &l->flight;
     LANE_SET(f->ox, fma(fx, (vfloat)params->plane_x.x, fma(fy, (vfloat)params->plane_y.x, (vfloat)params->plane_c.x)), mask);
     LANE_SET(f->oy, fma(fx, (vfloat)params->plane_x.y, fma(fy, (vfloat)params->plane_y.y, (vfloat)params->plane_c.y)), mask);

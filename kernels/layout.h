@@ -215,7 +215,7 @@ typedef struct PathState {
     float4 beta;
     float4 radiance;
     uint sample, depth, draw, flags;  // sample: the next one if no path is alive
-    uint row, next, pad0, pad1;       // of lanes: which of the work-item's rows, and the next sample of them all
+    uint row, next, pad0, pad1;       // of lanes: which row the path counts for; the next sample of this one
 } PathState;
 
 #ifdef __cplusplus

@@ -89,22 +89,37 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     sums_add(sums + (size_t)item * FILM_WORDS, sum, resume);
 }
 #else
-/// Gives the lanes in *idle a sample each, while there are any.
-static vint lanes_assign(Lanes* l, vint idle, uint* next, uint last, uint first_row, uint rows, uint pixel_count, uint splits, uint sample_begin, uint sample_end,
-                         __global const uint* pixels) {
-    vint begun = (vint)0;
-    for (uint i = 0; i < rows; ++i) {
-        if (!LANE_OF(int, idle, i)) continue;
-        while (*next < last) {
-            const uint row = *next % rows, item = first_row + row, sample = sample_begin + item / pixel_count + *next / rows * splits;
-            *next += 1;
-            if (sample >= sample_end) continue;
-            ((uint*)&l->row)[i] = row;
-            ((uint*)&l->draws.sample)[i] = sample;
-            ((uint*)&l->draws.pixel)[i] = pixels[item % pixel_count];
-            ((int*)&begun)[i] = -1;
-            break;
-        }
+/// A work-item's rows of sums, lane i being row i: their pixels, and the next sample of each.
+typedef struct {
+    vuint next, pixel;
+    vfloat x, y;  // the pixel's lower corner on the film
+} Rows;
+
+/// Gives each idle lane the next sample of its own row, or, that row being done, of the one of which most is left; returns the
+/// lanes that got one.
+static vint lanes_assign(Lanes* l, Rows* rows, vint idle, uint splits, uint sample_end) {
+    vint begun = idle & (rows->next < (vuint)sample_end);
+    LANE_SET(l->draws.sample, rows->next, begun);
+    LANE_SET(l->draws.pixel, rows->pixel, begun);
+    LANE_SET(l->film_x, rows->x, begun);
+    LANE_SET(l->film_y, rows->y, begun);
+    for (int i = 0; i < CLUME_WIDTH; ++i)
+        if (LANE_OF(int, begun, i)) ((uint*)&l->row)[i] = (uint)i;
+    LANE_SET(rows->next, rows->next + splits, begun);
+    if (!vany(rows->next < (vuint)sample_end)) return begun;
+    for (int i = 0; i < CLUME_WIDTH; ++i) {
+        if (!LANE_OF(int, idle, i) || LANE_OF(int, begun, i)) continue;
+        uint row = 0;
+        for (uint k = 1; k < CLUME_WIDTH; ++k)
+            if (LANE_OF(uint, rows->next, k) < LANE_OF(uint, rows->next, row)) row = k;
+        if (LANE_OF(uint, rows->next, row) >= sample_end) break;
+        ((uint*)&l->row)[i] = row;
+        ((uint*)&l->draws.sample)[i] = LANE_OF(uint, rows->next, row);
+        ((uint*)&l->draws.pixel)[i] = LANE_OF(uint, rows->pixel, row);
+        ((float*)&l->film_x)[i] = LANE_OF(float, rows->x, row);
+        ((float*)&l->film_y)[i] = LANE_OF(float, rows->y, row);
+        ((uint*)&rows->next)[row] += splits;
+        ((int*)&begun)[i] = -1;
     }
     return begun;
 }
@@ -148,9 +163,20 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
                      __global uint* unfinished, uint pixel_first, uint pixel_count, uint splits, uint sample_begin, uint sample_end, uint resume) {
     const uint first_row = (uint)get_global_id(0) * CLUME_WIDTH;
     if (first_row >= pixel_count * splits) return;
-    const uint rows = min((uint)CLUME_WIDTH, pixel_count * splits - first_row);
-    const uint last = rows * ((sample_end - sample_begin + splits - 1) / splits);
-    uint next = 0;
+    const uint count = min((uint)CLUME_WIDTH, pixel_count * splits - first_row);
+    Rows rows;
+    rows.next = (vuint)sample_end;
+    rows.pixel = (vuint)0u;
+    rows.x = rows.y = (vfloat)0.0f;
+    vint usable = (vint)0;  // a lane without a row has nowhere to leave its path
+    for (uint i = 0; i < count; ++i) {
+        ((int*)&usable)[i] = -1;
+        const uint pixel = pixels[pixel_first + (first_row + i) % pixel_count], y = pixel / params->film_width;
+        ((uint*)&rows.next)[i] = resume ? states[first_row + i].next : sample_begin + (first_row + i) / pixel_count;
+        ((uint*)&rows.pixel)[i] = pixel;
+        ((float*)&rows.x)[i] = (float)(pixel - y * params->film_width) - params->film_cx;
+        ((float*)&rows.y)[i] = (float)y - params->film_cy;
+    }
     Lanes l;
     l.alive = l.alpha = l.under_way = (vint)0;
     l.result = (vint)FLIGHT_ESCAPED;
@@ -158,13 +184,10 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     l.draws.seed = (uint2)(params->seed_lo, params->seed_hi);
     l.violations = 0;
     l.excess = 0;
-    if (resume) {
-        next = states[first_row].next;
-        for (uint i = 0; i < rows; ++i) {
-            const PathState s = states[first_row + i];
-            lanes_resume(&l, i, &s);
-            ((uint*)&l.draws.pixel)[i] = pixels[pixel_first + (first_row + s.row) % pixel_count];
-        }
+    for (uint i = 0; resume && i < count; ++i) {
+        const PathState s = states[first_row + i];
+        lanes_resume(&l, i, &s);
+        ((uint*)&l.draws.pixel)[i] = LANE_OF(uint, rows.pixel, s.row);
     }
     ulong sum[CLUME_WIDTH * FILM_WORDS];
     for (uint i = 0; i < CLUME_WIDTH * FILM_WORDS; ++i) sum[i] = 0;
@@ -173,8 +196,9 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     for (;;) {
         const bool tired = events >= CLUME_LAUNCH_EVENTS * CLUME_WIDTH;
         if (!tired) {
-            if (next < last && vany(~l.alive)) {
-                const vint begun = lanes_assign(&l, ~l.alive, &next, last, first_row, rows, pixel_count, splits, sample_begin, sample_end, pixels + pixel_first);
+            const vint idle = usable & ~l.alive;
+            if (vany(rows.next < (vuint)sample_end) && vany(idle)) {
+                const vint begun = lanes_assign(&l, &rows, idle, splits, sample_end);
                 lanes_start(&l, begun, params);
                 waiting |= begun;
             }
@@ -202,10 +226,10 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     }
     sum[FILM_VIOLATIONS] = l.violations;
     sum[FILM_EXCESS] = l.excess;
-    if (vany(l.alive) || next < last) atomic_inc(unfinished);
-    for (uint i = 0; i < rows; ++i) {
+    if (vany(l.alive) || vany(rows.next < (vuint)sample_end)) atomic_inc(unfinished);
+    for (uint i = 0; i < count; ++i) {
         PathState s;
-        lanes_save(&l, i, next, &s);
+        lanes_save(&l, i, LANE_OF(uint, rows.next, i), &s);
         states[first_row + i] = s;
         sums_add(sums + (size_t)(first_row + i) * FILM_WORDS, sum + i * FILM_WORDS, resume);
     }
