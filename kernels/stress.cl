@@ -92,6 +92,20 @@ __kernel void stress_light(SCENE_ARGS, __global const float4* points, __global c
     out[2 * i + 1] = lit ? (float4)(((const float*)&s.value)[0], s.pdf, 1.0f, 0.0f) : (float4)0.0f;
 }
 
+/// Samples of light 0, an environment image, and look-ups: in: two words of bits, a direction; out: direction sampled and its pdf;
+/// the value's first channel; texels sampled, found along that direction, found along the one given.
+__kernel void stress_environment(SCENE_ARGS, __global const uint4* bits, __global const float4* directions, __global float4* samples, __global float* values, __global uint4* found, uint count) {
+    const uint i = (uint)get_global_id(0);
+    if (i >= count) return;
+    LightSample s;
+    uint texel;
+    envmap_sample(0, bits[2 * i], bits[2 * i + 1], &texel, lights, alias);
+    light_sample((float3)(0.0f, 0.0f, 0.0f), bits[2 * i], bits[2 * i + 1], &s, params, lights, texels, alias);
+    samples[i] = (float4)(s.direction, s.pdf);
+    values[i] = ((const float*)&s.value)[0];
+    found[i] = (uint4)(texel, envmap_texel(0, s.direction, lights), envmap_texel(0, directions[i].xyz, lights), 0);
+}
+
 /// Exact transmittance of a ray's mixture, no roulette: the fixed-point sum of optical depths.
 __kernel void stress_transmittance(SCENE_ARGS, __global const float4* rays, __global float* out, uint count) {
     const uint i = (uint)get_global_id(0);

@@ -87,6 +87,17 @@ std::vector<StressDevice::LightSample> StressDevice::lights(const DeviceScene& s
     return out.download();
 }
 
+StressDevice::EnvironmentSample StressDevice::environment(const DeviceScene& scene, std::span<const StressBits> bits, std::span<const device::float4> directions) {
+    Impl& s = *impl_;
+    const SceneBuffers buffers(s.queue, scene);
+    const std::size_t n = directions.size();
+    Buffer<StressBits> words(s.queue, bits), texels(s.queue, n);
+    Buffer<device::float4> in(s.queue, directions), out(s.queue, n);
+    Buffer<float> values(s.queue, n);
+    s.run("stress_environment", &buffers, n, words, in, out, values, texels, cl_uint(n));
+    return {out.download(), values.download(), texels.download()};
+}
+
 std::vector<float> StressDevice::transmittances(const DeviceScene& scene, std::span<const ProbeRay> rays) {
     Impl& s = *impl_;
     const SceneBuffers buffers(s.queue, scene);

@@ -45,6 +45,14 @@ public:
     /// Two blocks of bits per point.
     std::vector<LightSample> lights(const DeviceScene& scene, std::span<const device::float4> points, std::span<const StressBits> bits);
 
+    struct EnvironmentSample {
+        std::vector<device::float4> directions;  ///< w: pdf
+        std::vector<float> values;
+        std::vector<StressBits> texels;  ///< sampled, found along the sample, found along the direction given
+    };
+    /// Of light 0, an image; two blocks of bits per sample, and as many directions to look up.
+    EnvironmentSample environment(const DeviceScene& scene, std::span<const StressBits> bits, std::span<const device::float4> directions);
+
     /// Sums of the mixture's optical depths as transmittances; the scene has a bvh.
     std::vector<float> transmittances(const DeviceScene& scene, std::span<const ProbeRay> rays);
 

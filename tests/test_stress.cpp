@@ -28,10 +28,12 @@ const StressResult& quick_result() {
     return result;
 }
 
-StressResult chords_alone(const StressOptions& options) {
+/// One part of it, such as stress_chords.
+template <class Part>
+StressResult alone(Part part, const StressOptions& options) {
     StressDevice device(test_device());
     StressResult result;
-    stress_chords(device, options, result, [](double) {});
+    part(device, options, result, [](double) {});
     return result;
 }
 
@@ -61,13 +63,13 @@ TEST_CASE("Stress.EveryLimitHolds", "[kernels][quick]") {
     }
     for (const char* name : {"FN(rcp)", "FN(divide)", "FN(rsqrt)", "FN(sqrt)", "FN(exp)", "FN(log)", "FN(exponential)", "FN(erfc)", "FN(erfc_inverse)", "FN(epanechnikov_inverse)", "sincos_turns_s", "asin_s", "acos_s",
                              "atan2_s", "normalize_s", "uniform_s", "erf_between", "intersect", "intersect_quadratic", "density_part", "depth_part", "flight_part", "transmittance_analytic", "phase_value", "phase_sample",
-                             "light_sample", "camera_ray"})
+                             "light_sample", "envmap_sample", "envmap_texel", "camera_ray"})
         CHECK(functions.count(name) == 1);
 }
 
 TEST_CASE("Stress.WrongFormulasAreFound", "[kernels][quick]") {
     // The textbook's formulas judged as if they were the kernels': each must break its limit in several families.
-    const StressResult result = chords_alone({.quick = true, .naive = true});
+    const StressResult result = alone(stress_chords, {.quick = true, .naive = true});
     CHECK_FALSE(result.holds());
     CHECK(exceeded(result, "intersect") > 3);
     CHECK(exceeded(result, "depth_part") > 3);
@@ -76,10 +78,28 @@ TEST_CASE("Stress.WrongFormulasAreFound", "[kernels][quick]") {
 
 TEST_CASE("Stress.TooStrictLimitsAreFound", "[kernels][quick]") {
     // No float chord is within a thousandth of an ulp: a check that reads the wrong column would not notice.
-    const StressResult result = chords_alone({.quick = true, .strictness = 4000});
+    const StressResult result = alone(stress_chords, {.quick = true, .strictness = 4000});
     std::size_t rows = 0;
     for (const StressRow& r : result.rows) rows += r.function == "intersect";
     CHECK(exceeded(result, "intersect") == rows);
+    const StressResult images = alone(stress_environment, {.quick = true, .strictness = 4000});
+    CHECK(exceeded(images, "envmap_sample") >= 10);
+    CHECK(exceeded(images, "light_sample") >= 10);
+    const StressResult lights = alone(stress_lights, {.quick = true, .strictness = 4000});
+    CHECK(exceeded(lights, "light_sample") > 25);
+}
+
+TEST_CASE("Stress.LightsTellWhatRoundingTheSceneDoes", "[kernels][quick]") {
+    for (const StressRow& r : quick_result().rows) {
+        if (!r.quantity.starts_with("light sampling") && !r.quantity.starts_with("environment image")) continue;
+        INFO(r.quantity << ", " << r.family << ": " << r.rounding.worst);
+        CHECK_FALSE(std::isnan(r.rounding.worst));
+        // The scene's numbers are rounded by half an ulp: what is well placed moves by no more than a few, and by something.
+        if (r.family == "point" || r.family == "sphere" || r.family == "spot" || r.family == "rectangle") {
+            CHECK(r.rounding.worst > 0);
+            if (r.quantity.ends_with("end")) CHECK(r.rounding.worst < 3);
+        }
+    }
 }
 
 TEST_CASE("Stress.RowsTellWhatIsWrong", "[quick]") {
