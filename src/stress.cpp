@@ -97,7 +97,8 @@ StressResult run_stress(const DeviceInfo& info, const StressOptions& options, co
     StressDevice device(info);
     const auto part = [&](double from, double to) { return [&progress, from, to](double share) { progress(from + share * (to - from)); }; };
     stress_math(device, options, result, part(0, 0.2));
-    stress_chords(device, options, result, part(0.2, 0.85));
+    stress_chords(device, options, result, part(0.2, 0.65));
+    stress_given(device, options, result, part(0.65, 0.85));
     stress_sums(device, options, result, part(0.85, 0.9));
     stress_sampling(device, options, result, part(0.9, 0.93));
     stress_lights(device, options, result, part(0.93, 0.96));

@@ -57,6 +57,16 @@ std::vector<ProbeChord> StressDevice::naive(std::span<const ProbeGroupRay> rays,
     return out.download();
 }
 
+std::vector<StressDevice::Given> StressDevice::given(std::span<const ProbeGroupRay> rays, std::span<const float> groups, device::uint family, float e2) {
+    Impl& s = *impl_;
+    static_assert(sizeof(Given) == 48);
+    Buffer<float> in(s.queue, groups);
+    Buffer<ProbeGroupRay> by(s.queue, rays);
+    Buffer<Given> out(s.queue, rays.size());
+    s.run("stress_given", nullptr, rays.size(), in, by, out, cl_uint(rays.size()), cl_uint(family), e2);
+    return out.download();
+}
+
 StressDevice::Phase StressDevice::phase(device::uint kind, std::span<const device::float4> directions, std::span<const float> versines, std::span<const StressBits> bits) {
     Impl& s = *impl_;
     Buffer<device::float4> d(s.queue, directions), out(s.queue, directions.size());

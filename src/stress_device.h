@@ -26,6 +26,14 @@ public:
     /// The textbook's formulas; only lane 0 of each group is looked at, and no density is given.
     std::vector<ProbeChord> naive(std::span<const ProbeGroupRay> rays, std::span<const float> groups, device::uint family, float e2);
 
+    struct Given {
+        float t_perp, w, d2, has;              ///< the geometry; has: some of the chord lies between t0 and t1
+        float start, stop, depth, flight;      ///< that part, its depth, the flight from its start
+        float naive_depth, naive_flight, unused[2];
+    };
+    /// Of each group's first primitive.
+    std::vector<Given> given(std::span<const ProbeGroupRay> rays, std::span<const float> groups, device::uint family, float e2);
+
     struct Phase {
         std::vector<device::float4> directions;  ///< w: pdf
         std::vector<float> values;               ///< at the versines given
