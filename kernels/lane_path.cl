@@ -6,6 +6,9 @@
 
 #if CLUME_LANES
 
+// Shadow rays that are flights, too, are flown side by side with the others: lanes stay full.
+#define LANE_SHADOWS (CLUME_NEE && CLUME_TRANSMITTANCE == TRANSMITTANCE_BINARY)
+
 typedef struct {
     LaneFlights flight;
     LaneDraws draws;
@@ -17,6 +20,11 @@ typedef struct {
     vfloat film_x, film_y;    // lower corner of the pixel, from the scene's centre
     vint alive, alpha;        // masks
     vint under_way, result;   // of the flights
+#if LANE_SHADOWS
+    vint shadow;                     // mask: the flight is a shadow ray's
+    vfloat light[CLUME_CHANNELS];    // what it adds if it gets through
+    vfloat next_x, next_y, next_z;   // direction that the path takes afterwards
+#endif
     uint violations;
     ulong excess;
 } Lanes;
@@ -69,10 +77,14 @@ static void lanes_start(Lanes* l, vint mask, __constant const RenderParams* para
 
 /// Begins the flights of the lanes in `mask`.
 static void lanes_depart(Lanes* l, vint mask, __constant const RenderParams* params, __global const CellEntry* cells, __global const LightInfo* lights) {
-    LANE_SET(l->t_surface, (vfloat)CLUME_INFINITY, mask);
+    vint path = mask;
+#if LANE_SHADOWS
+    path &= ~l->shadow;  // a shadow ray knows its end
+#endif
+    LANE_SET(l->t_surface, (vfloat)CLUME_INFINITY, path);
 #if LIGHT_SURFACES
     for (int i = 0; i < CLUME_WIDTH; ++i)
-        if (LANE_OF(int, mask, i))
+        if (LANE_OF(int, path, i))
             ((float*)&l->t_surface)[i] = surfaces_nearest(lane_origin(&l->flight, i), lane_direction(&l->flight, i), CLUME_INFINITY, NO_LIGHT, (uint*)&l->surface + i, params, lights);
 #endif
     const vint under_way = lanes_begin(&l->flight, l->t_surface, &l->draws, mask, params, cells);
@@ -126,6 +138,15 @@ static void lanes_escape(Lanes* l, vint mask, SCENE_ARGS) {
     }
 #endif
     l->alive &= ~mask;
+}
+
+/// The paths in `mask` go on from where they are, in a new direction.
+static void lanes_turn(Lanes* l, vfloat x, vfloat y, vfloat z, vint mask) {
+    LANE_SET(l->flight.dx, x, mask);
+    LANE_SET(l->flight.dy, y, mask);
+    LANE_SET(l->flight.dz, z, mask);
+    LANE_SET(l->draws.depth, l->draws.depth + 1u, mask);
+    LANE_SET(l->flight.draw, (vuint)0u, mask);
 }
 
 /// Scatters the paths of the lanes in `mask`, or ends them.
@@ -185,28 +206,58 @@ static void lanes_collide(Lanes* l, vint mask, SCENE_ARGS) {
     LANE_SET(f->ox, fma(f->t, f->dx, f->ox), lives);
     LANE_SET(f->oy, fma(f->t, f->dy, f->oy), lives);
     LANE_SET(f->oz, fma(f->t, f->dz, f->oz), lives);
+    lanes_bits(&l->draws, (vuint)DRAW_PHASE, &a, &b, &c, &d);
+    vfloat x = f->dx, y = f->dy, z = f->dz;
+    LANE_SET(l->phase_pdf, phase_sample_v(phase, g, a, b, c, d, &x, &y, &z), lives);
+    vint onward = lives;
 #if CLUME_NEE
     for (int i = 0; i < CLUME_WIDTH; ++i) {
         if (!LANE_OF(int, lives, i)) continue;
         const Draws r = {LANE_OF(uint, l->draws.sample, i), LANE_OF(uint, l->draws.pixel, i), LANE_OF(uint, l->draws.depth, i), l->draws.seed};
+        LightSample s;
+        spectrum value;
+        uint word;
+        if (!path_light_sample(lane_origin(f, i), lane_direction(f, i), LANE_OF(uint, phase, i), LANE_OF(float, g, i), &r, &s, &value, &word, SCENE)) continue;
+#if LANE_SHADOWS
+        value *= LANE_SPECTRUM(l->beta, i);
+        for (int k = 0; k < CLUME_CHANNELS; ++k) ((float*)(l->light + k))[i] = LANE_CHANNEL(value, k);
+        ((float*)&f->dx)[i] = s.direction.x;
+        ((float*)&f->dy)[i] = s.direction.y;
+        ((float*)&f->dz)[i] = s.direction.z;
+        ((float*)&l->t_surface)[i] = s.distance;
+        ((int*)&onward)[i] = 0;
+#else
         Flight flight;
         flight.violations = l->violations;
         flight.excess = l->excess;
-        const spectrum light = path_light(lane_origin(f, i), lane_direction(f, i), LANE_OF(uint, phase, i), LANE_OF(float, g, i), &r, &flight, SCENE);
-        lane_add(l->radiance, i, LANE_SPECTRUM(l->beta, i) * light);
+        value *= transmittance_estimate(lane_origin(f, i), s.direction, s.distance, word, &r, &flight, SCENE);
+        lane_add(l->radiance, i, LANE_SPECTRUM(l->beta, i) * value);
         l->violations = flight.violations;
         l->excess = flight.excess;
+#endif
     }
 #endif
-    lanes_bits(&l->draws, (vuint)DRAW_PHASE, &a, &b, &c, &d);
-    vfloat x = f->dx, y = f->dy, z = f->dz;
-    LANE_SET(l->phase_pdf, phase_sample_v(phase, g, a, b, c, d, &x, &y, &z), lives);
-    LANE_SET(f->dx, x, lives);
-    LANE_SET(f->dy, y, lives);
-    LANE_SET(f->dz, z, lives);
-    LANE_SET(l->draws.depth, l->draws.depth + 1u, lives);
     LANE_SET(f->t, (vfloat)0.0f, lives);
-    LANE_SET(f->draw, (vuint)0u, lives);
+#if LANE_SHADOWS
+    const vint shadow = lives & ~onward;
+    LANE_SET(l->next_x, x, shadow);
+    LANE_SET(l->next_y, y, shadow);
+    LANE_SET(l->next_z, z, shadow);
+    LANE_SET(f->draw, (vuint)DRAW_SHADOW, shadow);
+    l->shadow |= shadow;
+#endif
+    lanes_turn(l, x, y, z, onward);
 }
+
+#if LANE_SHADOWS
+/// Shadow rays that have ended: what got through counts, and the paths go on.
+static void lanes_lit(Lanes* l, vint mask) {
+    const vint clear = mask & (l->result == (vint)FLIGHT_ESCAPED);
+    for (int k = 0; k < CLUME_CHANNELS; ++k) LANE_SET(l->radiance[k], l->radiance[k] + l->light[k], clear);
+    LANE_SET(l->flight.t, (vfloat)0.0f, mask);
+    l->shadow &= ~mask;
+    lanes_turn(l, l->next_x, l->next_y, l->next_z, mask);
+}
+#endif
 
 #endif

@@ -55,26 +55,37 @@ static void collision_properties(uint primitive, spectrum* albedo, spectrum* emi
 #endif
 }
 
-/// What a light adds at x for a path that came along d, before beta.
-static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws* r, Flight* flight, SCENE_ARGS) {
 #if CLUME_NEE
-    LightSample s;
+/// A light that x sees past all surfaces: *value is what it adds there for a path that came along d, before beta and transmittance;
+/// *bits a word for the latter. False if none is.
+static bool path_light_sample(float3 x, float3 d, uint phase, float g, const Draws* r, LightSample* s, spectrum* value, uint* word, SCENE_ARGS) {
 #if CLUME_NEE & LIGHT_ENVMAP
     const uint4 more = draw_bits(r, DRAW_LIGHT_MORE);
 #else
     const uint4 more = (uint4)0u;
 #endif
     const uint4 bits = draw_bits(r, DRAW_LIGHT);
-    if (!light_sample(x, bits, more, &s, params, lights, texels, alias)) return (spectrum)0.0f;
+    if (!light_sample(x, bits, more, s, params, lights, texels, alias)) return false;
     uint blocker;
-    surfaces_nearest(x, s.direction, s.distance, s.light, &blocker, params, lights);
-    if (blocker != NO_LIGHT) return (spectrum)0.0f;
-    const float value = phase_value_s(phase, g, phase_versine(g, d, s.direction));
-    const float weight = (lights[s.light].kind & CLUME_HITS) ? divide_s(s.pdf, s.pdf + value) : 1.0f;
-    return s.value * (value * weight * transmittance_estimate(x, s.direction, s.distance, bits.w, r, flight, SCENE));
-#else
-    return (spectrum)0.0f;
+    surfaces_nearest(x, s->direction, s->distance, s->light, &blocker, params, lights);
+    if (blocker != NO_LIGHT) return false;
+    const float scattered = phase_value_s(phase, g, phase_versine(g, d, s->direction));
+    const float weight = (lights[s->light].kind & CLUME_HITS) ? divide_s(s->pdf, s->pdf + scattered) : 1.0f;
+    *value = s->value * (scattered * weight);
+    *word = bits.w;
+    return true;
+}
 #endif
+
+/// What a light adds at x for a path that came along d, before beta.
+static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws* r, Flight* flight, SCENE_ARGS) {
+#if CLUME_NEE
+    LightSample s;
+    spectrum value;
+    uint word;
+    if (path_light_sample(x, d, phase, g, r, &s, &value, &word, SCENE)) return value * transmittance_estimate(x, s.direction, s.distance, word, r, flight, SCENE);
+#endif
+    return (spectrum)0.0f;
 }
 
 /// What a ray that escapes finds.

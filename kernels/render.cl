@@ -182,6 +182,9 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     l.result = (vint)FLIGHT_ESCAPED;
     l.row = l.draws.sample = l.draws.pixel = l.draws.depth = (vuint)0u;
     l.draws.seed = (uint2)(params->seed_lo, params->seed_hi);
+#if LANE_SHADOWS
+    l.shadow = (vint)0;
+#endif
     l.violations = 0;
     l.excess = 0;
     for (uint i = 0; resume && i < count; ++i) {
@@ -202,16 +205,26 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
                 lanes_start(&l, begun, params);
                 waiting |= begun;
             }
-            lanes_depart(&l, waiting, params, cells, lights);
-            out |= waiting;
-            waiting = (vint)0;
         }
+        vint departing = tired ? (vint)0 : waiting;
+#if LANE_SHADOWS
+        departing |= waiting & l.shadow;  // paths are not saved amid a shadow ray
+#endif
+        lanes_depart(&l, departing, params, cells, lights);
+        out |= departing;
+        waiting &= ~departing;
         if (!vany(out)) break;
         const int busy = lanes_count(l.under_way);
         if (busy > 0) lanes_fly(&l.flight, &l.draws, &l.under_way, &l.result, tired ? 0 : busy * CLUME_LANES_ENOUGH / 16, &l.violations, SCENE);
-        const vint ended = out & ~l.under_way;
+        vint ended = out & ~l.under_way;
         out = l.under_way;
         events += lanes_count(ended);
+#if LANE_SHADOWS
+        const vint shadow = ended & l.shadow;
+        if (vany(shadow)) lanes_lit(&l, shadow & (l.result != (vint)FLIGHT_PAUSED));
+        waiting |= shadow;
+        ended &= ~shadow;
+#endif
         const vint escaped = ended & (l.result == (vint)FLIGHT_ESCAPED), collided = ended & (l.result == (vint)FLIGHT_COLLIDED);
         if (vany(escaped)) lanes_escape(&l, escaped, SCENE);
         if (vany(collided)) lanes_collide(&l, collided, SCENE);
