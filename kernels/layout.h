@@ -195,8 +195,9 @@ typedef struct GridInfo {
 
 typedef struct LightInfo {
     uint kind, visible, width, height;  // visible: to the camera
-    uint texel_offset, pad0, pad1;
-    float select_pdf;  // of being chosen for next-event estimation; 0: never
+    uint texel_offset;
+    float lamp_sigma, lamp_pdf;  // point and spot lights amid medium (lamp.cl): extinction about there, else 0; of being chosen among them
+    float select_pdf;            // of being chosen for next-event estimation; 0: never
     float4 radiance;   // radiance, intensity or irradiance; w: cumulative selection probability
     float4 position;   // position, centre, corner or direction; w: radius, or rectangle area
     float4 axis;       // spot direction, rectangle normal, environment's sin and cos of rotate_y in x, y; w: spot cutoff angle
