@@ -5,13 +5,14 @@
 // scattering by a direction and a distance that make up for 1/r² together [Georgiev13, doi 10.1145/2508363.2508411]. Balance
 // heuristic against a stand-in for the density of collisions: weights are functions of the place alone and add up to 1, so that
 // no estimate of a transmittance enters them.
+#include "camera.cl"
 #include "collision.cl"
 #include "light.cl"
 
 #if CLUME_LAMPS
 
 #ifndef CLUME_LAMP_EFFORT  // places whose expected part is below 1 / CLUME_LAMP_EFFORT of a typical sample are left to roulette
-#define CLUME_LAMP_EFFORT 4.0f
+#define CLUME_LAMP_EFFORT 1.0f
 #endif
 
 /// A ray within the media's bounds as a lamp sees it; lengths along it are counted from the foot, the place nearest to the lamp.
@@ -68,9 +69,23 @@ static float lamp_weight(uint i, float3 o, float3 d, float t, float t_end, bool 
     return divide_s(odds, 1.0f + odds);
 }
 
-/// What a lamp adds by one more place of scattering, before beta. camera: on the ray from o along d, which ends at t_end; else on a
+/// The camera's ray on which a place near lamp i is looked for: the path's own, but in the pixel that the lamp projects to, where
+/// radiance is as one over the distance to it, rays come as much denser there. Returns uniform density over this one's.
+static float lamp_camera_ray(uint i, uint pixel, float u, float turn, float3* o, float3* d, __constant const RenderParams* params, __global const LightInfo* lights) {
+    const uint x = pixel % params->film_width, y = pixel / params->film_width;
+    const float at_x = lights[i].edge_v.x - (float)x, at_y = lights[i].edge_v.y - (float)y;
+    if (!(at_x > 0.0f && at_x < 1.0f && at_y > 0.0f && at_y < 1.0f)) return 1.0f;
+    // Uniform in the angle, and in the distance up to the pixel's edge.
+    const float2 angle = sincos_turns_s(turn);
+    const float to_x = divide_s(angle.y > 0.0f ? 1.0f - at_x : at_x, max_s(fabs(angle.y), 0x1p-20f)), to_y = divide_s(angle.x > 0.0f ? 1.0f - at_y : at_y, max_s(fabs(angle.x), 0x1p-20f));
+    const float edge = min_s(to_x, to_y), distance = u * edge;
+    camera_ray(params, x, y, clamp_s(fma(distance, angle.y, at_x), 0.0f, 1.0f), clamp_s(fma(distance, angle.x, at_y), 0.0f, 1.0f), o, d);
+    return 2.0f * CLUME_PI * distance * edge;
+}
+
+/// What a lamp adds by one more place of scattering, before beta. camera: on the ray from o along d, or another of its pixel; else on a
 /// ray that a scattering at o, of light that came along d, sends out. `strength`: of beta.
-static spectrum lamp_light(const bool camera, float3 o, float3 d, float t_end, uint phase, float g, float strength, const Draws* r, Flight* flight, SCENE_ARGS) {
+static spectrum lamp_light(const bool camera, float3 o, float3 d, uint phase, float g, float strength, const Draws* r, Flight* flight, SCENE_ARGS) {
     const uint draw = camera ? DRAW_LAMP_CAMERA : DRAW_LAMP;
     const uint4 bits = draw_bits(r, draw), more = draw_bits(r, draw + 1u);
     COUNT(&flight->work, WORK_DRAWS, 2);
@@ -83,9 +98,12 @@ static spectrum lamp_light(const bool camera, float3 o, float3 d, float t_end, u
         if (choice < 0.0f) break;
     }
     if (i == NO_LIGHT) return (spectrum)0.0f;
+    float aim, foot, gap, film = 1.0f;
+    if (camera) {
+        film = lamp_camera_ray(i, r->pixel, uniform_s(bits.y), uniform_s(bits.z), &o, &d, params, lights);
+    }
     const float3 to_lamp = lights[i].position.xyz - o;
     float3 w = d;
-    float foot, gap, aim;
     if (camera) {
         foot = dot_s(to_lamp, d);
         const float3 off = to_lamp - foot * d;
@@ -98,23 +116,24 @@ static spectrum lamp_light(const bool camera, float3 o, float3 d, float t_end, u
         foot = distance * angle.y;
         gap = distance * angle.x;
         aim = lamp_aim_scattered(phase_value(phase, g, phase_versine(g, d, w)), inverse_r);
-        uint surface;
-        t_end = surfaces_nearest(o, w, CLUME_INFINITY, NO_LIGHT, &surface, params, lights);
     }
+    uint blocker;
+    const float t_end = surfaces_nearest(o, w, CLUME_INFINITY, NO_LIGHT, &blocker, params, lights);
     float t0, t1;
     if (!bounds_clip(o, w, 0.0f, t_end, &t0, &t1, params)) return (spectrum)0.0f;
     const LampView v = lamp_view(foot, gap, t0, t1);
     const float s = lamp_place(&v, uniform_s(bits.w)), t = foot + s, r2 = fma(s, s, v.gap * v.gap);
     const float sigma_lamp = lights[i].lamp_sigma, weight = rcp_s(1.0f + lamp_odds(i, &v, s, r2, aim, lights));
-    float value = v.span * aim * weight;
-    // Roulette on what the sample is expected to add, in units of what a light in a medium gives at one free path's distance.
-    const float chance = CLUME_LAMP_EFFORT * strength * value * rcp_s(sigma_lamp) * exp_s(-sigma_lamp * (s - v.begin + sqrt_s(r2)));
+    float value = film * v.span * aim * weight;
+    // Roulette on what the sample is expected to add, in units of what a light in a medium gives at one free path's distance. Half the
+    // extinction: a depth guessed too large would cost more variance than one too small costs time.
+    const float chance = CLUME_LAMP_EFFORT * strength * value * rcp_s(sigma_lamp) * exp_s(-0.5f * sigma_lamp * (s - v.begin + sqrt_s(r2)));
     if (chance < 1.0f) {
         if (uniform_s(more.x) >= chance) return (spectrum)0.0f;
         value *= rcp_s(chance);
     }
     const float3 x = along_s(o, w, t);
-    uint primitive = CLUME_NO_PRIMITIVE, blocker;
+    uint primitive = CLUME_NO_PRIMITIVE;
     value *= medium_density(x, uniform_s(more.y), uniform_s(more.z), &primitive, &flight->work, SCENE);
     if (!(value > 0.0f)) return (spectrum)0.0f;
     const float3 rest = lights[i].position.xyz - x;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // One path, event by event: a flight to the next collision or surface, emission there, roulette, next-event estimation with
 // MIS (balance heuristic), scattering. A path lives in PathState between launches.
-#include "camera.cl"
 #include "lamp.cl"
 
 #define PATH_ALIVE 1u
@@ -75,7 +74,7 @@ static void path_event(Path* p, uint pixel, SCENE_ARGS) {
 #endif
 #if CLUME_LAMPS
     if (p->depth == 0 && LAMP_DEPTH(0))
-        p->radiance += lamp_light(true, p->o, p->d, t_end, 0, 0.0f, 1.0f, &r, &p->flight, SCENE);
+        p->radiance += lamp_light(true, p->o, p->d, 0, 0.0f, 1.0f, &r, &p->flight, SCENE);
 #endif
     if (result == FLIGHT_ESCAPED) {
         p->flags &= ~PATH_ALIVE;
@@ -129,7 +128,7 @@ static void path_event(Path* p, uint pixel, SCENE_ARGS) {
 #endif
 #if CLUME_LAMPS
     if (LAMP_DEPTH(p->depth + 1))
-        p->radiance += p->beta * lamp_light(false, x, p->d, 0.0f, phase, g, spectrum_max(p->beta), &r, &p->flight, SCENE);
+        p->radiance += p->beta * lamp_light(false, x, p->d, phase, g, spectrum_max(p->beta), &r, &p->flight, SCENE);
 #endif
     p->d = phase_sample(phase, g, p->d, draw_bits(&r, DRAW_PHASE), &p->phase_pdf);
     p->o = x;

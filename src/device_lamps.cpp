@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/device_values.h"
 #include "src/voxel_grid.h"
 
 namespace clume {
@@ -50,6 +51,16 @@ double extinction(const GridMedium& m, const glm::dvec3& p) {
     return m.density_scale * static_cast<double>(sample_at(m.density, glm::ivec3(q)));
 }
 
+/// Film point [pixels] that a world point projects to; far away if it lies behind a perspective camera.
+glm::dvec3 film_point(const Scene& scene, const glm::dvec3& p) {
+    const Camera& c = scene.camera;
+    const glm::dvec3 f = glm::normalize(c.target - c.origin), r = glm::normalize(glm::cross(f, c.up)), u = glm::cross(r, f), q = p - c.origin;
+    const bool perspective = c.kind == CameraKind::perspective;
+    const double depth = perspective ? glm::dot(q, f) : 1, pixel = 2 * (perspective ? std::tan(c.fov_rad / 2) : c.width / 2) / scene.film.width;
+    if (!(depth > 0)) return glm::dvec3(-1e9);
+    return glm::clamp(glm::dvec3(0.5 * scene.film.width + glm::dot(q, r) / (depth * pixel), 0.5 * scene.film.height - glm::dot(q, u) / (depth * pixel), 0), -1e9, 1e9);
+}
+
 }  // namespace
 
 std::size_t mark_lamps(const Scene& scene, const BvhTree& tree, DeviceScene& out) {
@@ -78,6 +89,7 @@ std::size_t mark_lamps(const Scene& scene, const BvhTree& tree, DeviceScene& out
         // A power of two: every host finds the same one, whatever its exp.
         const double mean = sum / (kPoints * kPoints * kPoints);
         light.lamp_sigma = static_cast<float>(std::exp2(std::rint(std::log2(std::clamp(mean, 1.0 / 16, 0x1p20)))));
+        light.edge_v = pack(film_point(scene, world));
         total += static_cast<double>(light.select_pdf);
         ++count;
     }

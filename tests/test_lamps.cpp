@@ -3,6 +3,7 @@
 // scatterings against light tracing on the host, noise that falls as it must, and where all this is left out.
 #include <numbers>
 
+#include "src/strategies.h"
 #include "tests/device_image.h"
 #include "tests/pairs.h"
 #include "tests/reference/host_light_tracer.h"
@@ -136,9 +137,11 @@ TEST_CASE("Lamps.PlacesAreUniformInTheAngle", "[quick]") {
         const Probe::LampPlace& p = places[i];
         REQUIRE(p.place >= p.begin);
         REQUIRE(p.place <= p.end);
-        const double gap = views[i].gap, begin = p.begin, end = p.end, s = p.place;
+        const auto gap = static_cast<double>(views[i].gap), begin = static_cast<double>(p.begin), end = static_cast<double>(p.end), s = static_cast<double>(p.place);
         const auto angle = [&](double a, double b) { return std::atan2(gap * (b - a), gap * gap + a * b); };
-        worst_span = std::max(worst_span, std::abs(static_cast<double>(p.span) / angle(begin, end) - 1));
+        // The ray's own length: its ends, counted from the foot, are rounded.
+        const double length = static_cast<double>(views[i].t1) - static_cast<double>(views[i].t0);
+        worst_span = std::max(worst_span, std::abs(static_cast<double>(p.span) / std::atan2(gap * length, gap * gap + begin * end) - 1));
         // The angle up to the place, beside what rounding of the place itself makes of it.
         const double blur = std::abs(s) * 0x1p-23 * gap / (gap * gap + s * s);
         worst = std::max(worst, (std::abs(angle(begin, s) - static_cast<double>(u[i]) * angle(begin, end)) - blur) / angle(begin, end));
