@@ -36,8 +36,9 @@ static LampView lamp_view(float foot, float gap, float t0, float t1) {
 /// Equiangular place, from the foot: uniform in the angle at the lamp, density gap / (span (gap² + s²)). No digits are lost near
 /// the lamp, since nothing is subtracted that isn't as small.
 static float lamp_place(const LampView* v, float u) {
-    const float2 turn = sincos_turns_s(u * v->span * CLUME_INV_2PI);
-    const float along = fma(v->begin, turn.y, v->gap * turn.x), across = fma(v->gap, turn.y, -v->begin * turn.x);
+    float cosine;
+    const float sine = sincos_turns_s(u * v->span * CLUME_INV_2PI, &cosine);
+    const float along = fma(v->begin, cosine, v->gap * sine), across = fma(v->gap, cosine, -v->begin * sine);
     return clamp_s(v->gap * divide_s(along, max_s(across, 0x1p-80f)), v->begin, v->end);
 }
 
@@ -76,10 +77,11 @@ static float lamp_camera_ray(uint i, uint pixel, float u, float turn, float3* o,
     const float at_x = lights[i].edge_v.x - (float)x, at_y = lights[i].edge_v.y - (float)y;
     if (!(at_x > 0.0f && at_x < 1.0f && at_y > 0.0f && at_y < 1.0f)) return 1.0f;
     // Uniform in the angle, and in the distance up to the pixel's edge.
-    const float2 angle = sincos_turns_s(turn);
-    const float to_x = divide_s(angle.y > 0.0f ? 1.0f - at_x : at_x, max_s(fabs(angle.y), 0x1p-20f)), to_y = divide_s(angle.x > 0.0f ? 1.0f - at_y : at_y, max_s(fabs(angle.x), 0x1p-20f));
+    float cosine;
+    const float sine = sincos_turns_s(turn, &cosine);
+    const float to_x = divide_s(cosine > 0.0f ? 1.0f - at_x : at_x, max_s(fabs(cosine), 0x1p-20f)), to_y = divide_s(sine > 0.0f ? 1.0f - at_y : at_y, max_s(fabs(sine), 0x1p-20f));
     const float edge = min_s(to_x, to_y), distance = u * edge;
-    camera_ray(params, x, y, clamp_s(fma(distance, angle.y, at_x), 0.0f, 1.0f), clamp_s(fma(distance, angle.x, at_y), 0.0f, 1.0f), o, d);
+    camera_ray(params, x, y, clamp_s(fma(distance, cosine, at_x), 0.0f, 1.0f), clamp_s(fma(distance, sine, at_y), 0.0f, 1.0f), o, d);
     return 2.0f * CLUME_PI * distance * edge;
 }
 
@@ -111,11 +113,12 @@ static spectrum lamp_light(const bool camera, float3 o, float3 d, uint phase, fl
         aim = lamp_aim_camera(gap);
     } else {
         const float square = max_s(dot_s(to_lamp, to_lamp), 0x1p-90f), inverse_r = rsqrt_s(square), distance = square * inverse_r;
-        const float2 angle = sincos_turns_s(0.5f * uniform_s(bits.y));
-        w = around(to_lamp * inverse_r, angle.y, angle.x, uniform_s(bits.z));
-        foot = distance * angle.y;
-        gap = distance * angle.x;
-        aim = lamp_aim_scattered(phase_value(phase, g, phase_versine(g, d, w)), inverse_r);
+        float cosine;
+        const float sine = sincos_turns_s(0.5f * uniform_s(bits.y), &cosine);
+        w = around(to_lamp * inverse_r, cosine, sine, uniform_s(bits.z));
+        foot = distance * cosine;
+        gap = distance * sine;
+        aim = lamp_aim_scattered(phase_value_s(phase, g, phase_versine(g, d, w)), inverse_r);
     }
     uint blocker;
     const float t_end = surfaces_nearest(o, w, CLUME_INFINITY, NO_LIGHT, &blocker, params, lights);
@@ -149,7 +152,7 @@ static spectrum lamp_light(const bool camera, float3 o, float3 d, uint phase, fl
     uint next_phase;
     float next_g;
     collision_properties(primitive, &albedo, &emission, &next_phase, &next_g, SCENE);
-    value *= divide_s(phase_value(next_phase, next_g, phase_versine(next_g, w, back)), lights[i].lamp_pdf);
+    value *= divide_s(phase_value_s(next_phase, next_g, phase_versine(next_g, w, back)), lights[i].lamp_pdf);
     // To the place, then to the lamp, each with random numbers of its own.
     for (uint leg = 0; leg < 2u && value > 0.0f; ++leg) {
         const Draws own = {r->sample, r->pixel, r->depth | (camera ? DRAWS_FROM_CAMERA : 0u) | (leg ? DRAWS_TO_LAMP : DRAWS_TO_PLACE), r->seed};
