@@ -100,6 +100,7 @@ int run_bench(int argc, char** argv) {
         bench_scenes_section(session);
         bench_kernels_section(session);
         bench_specialisation_section(session);
+        bench_lamps_section(session);
         bench_scaling_section(session);
         bench_devices_section(session);
         bench_work_section(session);

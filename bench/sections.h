@@ -9,6 +9,7 @@ namespace clume::bench {
 void bench_scenes_section(Session& session);   ///< compare_host.cpp
 void bench_kernels_section(Session& session);  ///< kernels.cpp and groups.cpp
 void bench_specialisation_section(Session& session);
+void bench_lamps_section(Session& session);
 void bench_scaling_section(Session& session);
 void bench_devices_section(Session& session);
 void bench_work_section(Session& session);     ///< work_fit.cpp

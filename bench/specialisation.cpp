@@ -37,7 +37,7 @@ const std::vector<Variant>& variants() {
         {"rgb", {{"CLUME_CHANNELS", "3"}}},
         {"everything",
          {{"CLUME_FAMILIES", "7"}, {"CLUME_ONE_MEDIUM", "0"}, {"CLUME_PHASES", "7"}, {"CLUME_UNIFORM_G", "0"}, {"CLUME_UNIFORM_ALBEDO", "0"}, {"CLUME_EMISSION", "2"},
-          {"CLUME_LIGHTS", "127"}, {"CLUME_NEE", "126"}, {"CLUME_CHANNELS", "3"}, {"CLUME_VISIBLE_BACKGROUND", "1"}, {"CLUME_DEPTH_LIMIT", "1"}}}};
+          {"CLUME_LIGHTS", "127"}, {"CLUME_NEE", "126"}, {"CLUME_LAMPS", "1"}, {"CLUME_CHANNELS", "3"}, {"CLUME_VISIBLE_BACKGROUND", "1"}, {"CLUME_DEPTH_LIMIT", "1"}}}};
     return all;
 }
 

@@ -35,6 +35,9 @@
 #ifndef CLUME_NEE  // light kinds sampled by next-event estimation
 #define CLUME_NEE 126
 #endif
+#ifndef CLUME_LAMPS  // 1: some point or spot light has medium around it
+#define CLUME_LAMPS ((CLUME_NEE & (LIGHT_POINT | LIGHT_SPOT)) != 0)
+#endif
 #ifndef CLUME_HITS  // light kinds that count when a scattered path finds them
 #define CLUME_HITS 99
 #endif

@@ -104,6 +104,13 @@ static float grid_value(__global const GridInfo* grid, float4 q, __global const 
     return brick_value(grid_brick(grid, link, grid_values), place, grid_is_nearest(grid));
 }
 
+/// Value at p, 0 outside the support.
+static float grid_density(__global const GridInfo* grid, float3 p, __global const CellEntry* grid_cells, __global const float* grid_values) {
+    const float4 q = grid_coordinates(grid, p - grid->center.xyz, 1.0f), lower = grid->lower, upper = grid->upper;
+    const bool inside = q.x >= lower.x && q.x <= upper.x && q.y >= lower.y && q.y <= upper.y && q.z >= lower.z && q.z <= upper.z;
+    return inside ? grid_value(grid, q, grid_cells, grid_values) : 0.0f;
+}
+
 /// A ray's way through the cells of one brick. Planes are those of the table's walk, by the same formula, so that the last
 /// cell ends exactly where the brick does.
 typedef struct {

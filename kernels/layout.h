@@ -195,12 +195,13 @@ typedef struct GridInfo {
 
 typedef struct LightInfo {
     uint kind, visible, width, height;  // visible: to the camera
-    uint texel_offset, pad0, pad1;
-    float select_pdf;  // of being chosen for next-event estimation; 0: never
+    uint texel_offset;
+    float lamp_sigma, lamp_pdf;  // point and spot lights amid medium (lamp.cl): extinction about there, else 0; of being chosen among them
+    float select_pdf;            // of being chosen for next-event estimation; 0: never
     float4 radiance;   // radiance, intensity or irradiance; w: cumulative selection probability
     float4 position;   // position, centre, corner or direction; w: radius, or rectangle area
     float4 axis;       // spot direction, rectangle normal, environment's sin and cos of rotate_y in x, y; w: spot cutoff angle
-    float4 edge_u, edge_v;  // rectangle; spot: edge_u.x = 1 / (cutoff − beam)
+    float4 edge_u, edge_v;  // rectangle; spot: edge_u.x = 1 / (cutoff − beam); lamps: film point it projects to in edge_v.x, y
     float4 dual_u, dual_v;  // rectangle: edge_u · dual_u = 1, edge_v · dual_u = 0 and the other way round
 } LightInfo;
 

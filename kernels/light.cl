@@ -153,6 +153,15 @@ typedef struct {
     uint light;
 } LightSample;
 
+#if CLUME_NEE & LIGHT_SPOT
+/// Of a spot's intensity, the share that it sends to where `direction` leads to it from.
+static float spot_falloff(uint i, float3 direction, __global const LightInfo* lights) {
+    const float3 axis = lights[i].axis.xyz, across = cross_s(direction, axis);
+    const float angle = atan2_s(sqrt_s(dot_s(across, across)), -dot_s(direction, axis));
+    return clamp_s((lights[i].axis.w - angle) * lights[i].edge_u.x, 0.0f, 1.0f);
+}
+#endif
+
 #if CLUME_NEE
 /// Chooses one light, then a direction; false if the choice cannot light o. `bits` and `more` are 8 words of their own.
 /// direction error < 1e-6 absolute; its end on the light, end error < 3 ulp of the radius (of the distance if that is greater);
@@ -182,9 +191,7 @@ static bool light_sample(float3 o, uint4 bits, uint4 more, LightSample* s, __con
         s->value *= inverse_r * inverse_r;
 #if CLUME_NEE & LIGHT_SPOT
         if (kind == LIGHT_SPOT) {
-            const float3 axis = lights[i].axis.xyz, across = cross_s(s->direction, axis);
-            const float angle = atan2_s(sqrt_s(dot_s(across, across)), -dot_s(s->direction, axis));
-            const float falloff = clamp_s((lights[i].axis.w - angle) * lights[i].edge_u.x, 0.0f, 1.0f);
+            const float falloff = spot_falloff(i, s->direction, lights);
             if (!(falloff > 0.0f)) return false;
             s->value *= falloff;
         }

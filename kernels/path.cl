@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: MIT
 // One path, event by event: a flight to the next collision or surface, emission there, roulette, next-event estimation with
 // MIS (balance heuristic), scattering. A path lives in PathState between launches.
-#include "camera.cl"
-#include "light.cl"
+#include "lamp.cl"
 
 #define PATH_ALIVE 1u
 #define PATH_ALPHA 2u  // the camera ray met something
+
+// Whether a path may scatter at `depth`.
+#if CLUME_DEPTH_LIMIT
+#define LAMP_DEPTH(depth) ((int)(depth) < params->max_depth)
+#else
+#define LAMP_DEPTH(depth) true
+#endif
 
 typedef struct {
     float3 o, d;
@@ -27,32 +33,6 @@ static void path_begin(Path* p, uint pixel, uint sample, __constant const Render
     p->flags = PATH_ALIVE;
     p->flight.t = 0.0f;
     p->flight.draw = 0;
-}
-
-/// Albedo, emission and phase function at a collision with `primitive`.
-static void collision_properties(uint primitive, spectrum* albedo, spectrum* emission, uint* phase, float* g, SCENE_ARGS) {
-    *albedo = to_spectrum(params->albedo);
-    *emission = to_spectrum(params->emission);
-    *g = params->albedo.w;
-    *phase = CLUME_PHASES;
-#if CLUME_PER_PRIMITIVE
-    const float4 a = shading[2 * (size_t)primitive];
-#if !CLUME_UNIFORM_ALBEDO
-    *albedo = to_spectrum(a);
-#endif
-#if !CLUME_UNIFORM_G
-    *g = a.w;
-#endif
-#if CLUME_EMISSION == 2 || !CLUME_ONE_MEDIUM
-    const float4 e = shading[2 * (size_t)primitive + 1];
-#if CLUME_EMISSION == 2
-    *emission = to_spectrum(e);
-#endif
-#if !CLUME_ONE_MEDIUM
-    *phase = media[as_uint(e.w)].phase;
-#endif
-#endif
-#endif
 }
 
 #if CLUME_NEE
@@ -77,13 +57,19 @@ static bool path_light_sample(float3 x, float3 d, uint phase, float g, const Dra
 }
 #endif
 
-/// What a light adds at x for a path that came along d, before beta.
-static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws* r, Flight* flight, SCENE_ARGS) {
+/// What a light adds at x, where the path's flight towards t_end has ended, before beta.
+static spectrum path_light(const Path* p, float3 x, float t_end, uint phase, float g, const Draws* r, Flight* flight, SCENE_ARGS) {
 #if CLUME_NEE
     LightSample s;
     spectrum value;
     uint word;
-    if (path_light_sample(x, d, phase, g, r, &s, &value, &word, SCENE)) return value * transmittance_estimate(x, s.direction, s.distance, word, r, flight, SCENE);
+    if (path_light_sample(x, p->d, phase, g, r, &s, &value, &word, SCENE)) {
+#if CLUME_LAMPS
+        if (lights[s.light].lamp_sigma > 0.0f)
+            value *= lamp_weight(s.light, p->o, p->d, p->flight.t, t_end, p->depth == 0, p->phase_pdf, s.distance * s.distance, params, lights);
+#endif
+        return value * transmittance_estimate(x, s.direction, s.distance, word, r, flight, SCENE);
+    }
 #endif
     return (spectrum)0.0f;
 }
@@ -120,6 +106,10 @@ static void path_event(Path* p, uint pixel, SCENE_ARGS) {
     COUNT(&p->flight.work, WORK_EVENTS, 1);
 #if CLUME_GRID_EMISSION
     p->radiance += p->beta * to_spectrum(grids_emission(p->o, p->d, result == FLIGHT_COLLIDED ? p->flight.t : t_end, &p->flight.work, SCENE));
+#endif
+#if CLUME_LAMPS
+    if (p->depth == 0 && LAMP_DEPTH(0))
+        p->radiance += lamp_light(true, p->o, p->d, 0, 0.0f, 1.0f, &r, &p->flight, SCENE);
 #endif
     if (result == FLIGHT_ESCAPED) {
         p->flags &= ~PATH_ALIVE;
@@ -160,7 +150,11 @@ static void path_event(Path* p, uint pixel, SCENE_ARGS) {
     }
     const float3 x = along_s(p->o, p->d, p->flight.t);
 #if CLUME_NEE
-    p->radiance += p->beta * path_light(x, p->d, phase, g, &r, &p->flight, SCENE);
+    p->radiance += p->beta * path_light(p, x, t_end, phase, g, &r, &p->flight, SCENE);
+#endif
+#if CLUME_LAMPS
+    if (LAMP_DEPTH(p->depth + 1))
+        p->radiance += p->beta * lamp_light(false, x, p->d, phase, g, spectrum_max(p->beta), &r, &p->flight, SCENE);
 #endif
     p->d = phase_sample(phase, g, p->d, draw_bits(&r, DRAW_PHASE), &p->phase_pdf);
     p->o = x;

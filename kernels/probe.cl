@@ -208,3 +208,13 @@ __kernel void probe_phase(uint kind, float g, float3 d, uint seed, __global floa
     const float3 s = phase_sample(kind, g, d, bits, &pdf);
     out[i] = (float4)(dot_s(s, d), pdf, phase_value_s(kind, g, phase_versine(g, d, s)), dot_s(s, s));
 }
+
+#if CLUME_LAMPS
+/// View i, in: foot, gap, t0, t1; u[i]: out: the equiangular place from the foot, and the view's begin, end and span.
+__kernel void probe_lamp(__global const float4* views, __global const float* u, __global float4* out, uint count) {
+    const uint i = (uint)get_global_id(0);
+    if (i >= count) return;
+    const LampView v = lamp_view(views[i].x, views[i].y, views[i].z, views[i].w);
+    out[i] = (float4)(lamp_place(&v, u[i]), v.begin, v.end, v.span);
+}
+#endif

@@ -13,7 +13,13 @@
 #define DRAW_CAMERA 0xf0000002u
 #define DRAW_ROULETTE 0xf0000003u
 #define DRAW_LIGHT_MORE 0xf0000004u
+#define DRAW_LAMP 0xf0000005u         // and the next: one more place near a lamp, from a scattering
+#define DRAW_LAMP_CAMERA 0xf0000007u  // and the next: the same on the camera's ray
 #define DRAW_SHADOW 0x40000000u  // and on: transmittance estimates
+// Bits of the depth that give the two legs of light by a place near a lamp numbers of their own.
+#define DRAWS_TO_PLACE 0x80000000u
+#define DRAWS_TO_LAMP 0x40000000u
+#define DRAWS_FROM_CAMERA 0x20000000u  // beside one of them
 
 /// x · factor: its upper and lower words. 64-bit products, those of a vector by even and odd lanes: mul_hi is slow on some devices.
 static void product_s(uint x, uint factor, uint* high, uint* low) {

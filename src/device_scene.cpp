@@ -11,6 +11,7 @@
 #include "src/cells.h"
 #include "src/device_camera.h"
 #include "src/device_grids.h"
+#include "src/device_lamps.h"
 #include "src/device_lights.h"
 #include "src/device_mixture.h"
 #include "src/device_values.h"
@@ -132,7 +133,7 @@ struct Structures {
     bool chords = false;       ///< something visits chords
 };
 
-Structures structures_of(const DeviceScene& out, bool shadow_rays, const RenderOptions& options) {
+Structures structures_of(const DeviceScene& out, bool shadow_rays, bool lamps, const RenderOptions& options) {
     const std::string &s = out.strategy, &t = out.transmittance;
     const bool segments = s == "regular" || s == "regular-linear" || s == "march-analytic";
     const bool null_transmittance = shadow_rays && (t == "ratio" || t == "residual-ratio" || (t == "binary" && s == "delta"));
@@ -145,13 +146,12 @@ Structures structures_of(const DeviceScene& out, bool shadow_rays, const RenderO
     w.references = null_collisions && !w.scene_bound;
     // Measured (docs/performance.md): the bvh is ahead for depths everywhere, and for flights where sizes are mixed.
     w.bvh = segments || options.accelerator == "bvh" || (options.accelerator == "auto" && chords && s != "march");
-    w.cell_groups = w.scene_bound || s == "progressive" || (!w.bvh && (chords || march));
+    w.cell_groups = w.scene_bound || s == "progressive" || (!w.bvh && (chords || march || lamps));
     return w;
 }
 
 /// Builds what is wanted; says what it is.
-std::string build_structures(const Structures& wanted, std::optional<int> majorant_grid, DeviceScene& out) {
-    const BvhTree tree = build_bvh(out.ellipsoids);
+std::string build_structures(const Structures& wanted, const BvhTree& tree, std::optional<int> majorant_grid, DeviceScene& out) {
     std::string text;
     if (wanted.references || wanted.cell_groups) {
         const bool densities = wanted.scene_bound || out.strategy == "progressive";
@@ -249,20 +249,27 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     out.strategy = r.strategy != "auto" ? r.strategy : "delta";
     out.transmittance = r.transmittance != "auto" ? r.transmittance : "analytic";
     out.bound = r.bound != "auto" ? r.bound : out.strategy == "progressive" || r.majorant_grid ? "grid" : "tree";
-    const Structures wanted = with_structures ? structures_of(out, lights.nee != 0, options) : Structures{};
-
     const auto start = std::chrono::steady_clock::now();
     std::uint64_t primitives = 0;
     for (const auto& m : scene.media) primitives += m.primitives.size();
     require_memory(scene.path, {{"primitives for the device", primitives * (sizeof(Ellipsoid) + sizeof(device::Primitive))}, {"tree over them", primitives * 2 * sizeof(BvhTree::Node)}});
     out.ellipsoids = make_ellipsoids(scene, out.normalization);
-    const Box bounds = bounds_of(out.ellipsoids);
-    out.params.bounds_min = pack(bounds.lo);
-    out.params.bounds_max = pack(bounds.hi);
+    const BvhTree tree = with_structures ? build_bvh(out.ellipsoids) : BvhTree{};
+    const std::size_t lamps = with_structures && (lights.nee & (LIGHT_POINT | LIGHT_SPOT)) ? mark_lamps(scene, tree, out) : 0;
+    const Structures wanted = with_structures ? structures_of(out, lights.nee != 0, lamps > 0, options) : Structures{};
     std::string accelerator;
-    if (with_structures) accelerator = build_structures(wanted, r.majorant_grid, out);
+    if (with_structures) accelerator = build_structures(wanted, tree, r.majorant_grid, out);
     else pack_primitives(out);
     const GridTraits voxels = pack_grids(scene, out);
+    Box bounds = bounds_of(out.ellipsoids);
+    if (lamps > 0)  // the mixture alone needs no more than its own
+        for (const auto& box : out.grid_boxes)
+            for (const glm::dvec3& corner : box) {
+                const glm::dvec3 p = (corner - out.normalization.center) * out.normalization.scale;
+                bounds = {glm::min(bounds.lo, p - 0x1p-18), glm::max(bounds.hi, p + 0x1p-18)};
+            }
+    out.params.bounds_min = pack(bounds.lo);
+    out.params.bounds_max = pack(bounds.hi);
     out.accelerator_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
     const double brightest = std::max({lights.brightest, traits.brightest, voxels.brightest});
@@ -306,6 +313,7 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     define("CLUME_EMISSION", traits.emission);
     define("CLUME_LIGHTS", lights.present);
     define("CLUME_NEE", lights.nee);
+    define("CLUME_LAMPS", lamps > 0);
     define("CLUME_HITS", lights.hits);
     define("CLUME_VISIBLE_BACKGROUND", lights.visible_background);
     define("CLUME_CHANNELS", grey ? 1 : 3);
@@ -317,7 +325,7 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     define("CLUME_ACCEL", wanted.bvh ? 2 : 1);
     define("CLUME_COUNT", options.count_work || out.strategy == "progressive");  // its look-ups are reported
     // Null collisions under the cells' bounds look at one primitive at a time: vectors are of rays, not of primitives.
-    out.lanes = out.strategy == "delta" && out.bound != "scene" && scene.grids.empty() && !options.count_work;
+    out.lanes = out.strategy == "delta" && out.bound != "scene" && scene.grids.empty() && lamps == 0 && !options.count_work;
     define("CLUME_LANES", out.lanes);
     if (wanted.bvh) define("CLUME_BVH_STACK", std::max(1u, out.bvh_stack));  // OpenCL C knows no empty arrays
     define("CLUME_MIXTURE", !out.ellipsoids.empty() || scene.grids.empty());
@@ -338,6 +346,7 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     say("emission", traits.emission == 0 ? "left out: nothing emits" : traits.emission == 1 ? "one for all" : "looked up per primitive");
     say("lights", names(lights.present, kinds));
     say("next-event estimation", lights.nee ? names(lights.nee, kinds) : "left out");
+    if (lights.nee & (LIGHT_POINT | LIGHT_SPOT)) say("lights amid medium", lamps > 0 ? fmt::format("{}: what scatters near them is sampled on its own", lamps) : "none");
     say("lights found by paths", names(lights.hits, kinds));
     say("opaque surfaces", lights.present & (LIGHT_SPHERE | LIGHT_RECTANGLE) ? "tested on every ray" : "left out");
     say("visible background", lights.visible_background ? "yes" : "left out");

@@ -21,7 +21,7 @@ constexpr std::uint32_t kPixels = 1024;     ///< at most
 constexpr std::uint32_t kSamples = 16;      ///< of each
 constexpr std::uint32_t kFirstSample = 0xc0000000u;  ///< numbers of their own: the image's noise is not what was chosen by
 constexpr std::size_t kFewPrimitives = 64;  ///< up to which one bound for the whole scene may be the cheapest
-constexpr int kVersion = 4;                 ///< of the candidates and of how they are measured
+constexpr int kVersion = 5;                 ///< of the candidates and of how they are measured
 
 std::size_t primitive_count(const Scene& scene) {
     std::size_t count = 0;

@@ -189,4 +189,13 @@ std::vector<device::float4> Probe::phases(device::uint kind, float g, const floa
     return out.download();
 }
 
+std::vector<Probe::LampPlace> Probe::lamp_places(std::span<const LampView> views, std::span<const float> u) {
+    Impl& s = *impl_;
+    Buffer<LampView> in(s.queue, views);
+    Buffer<float> by(s.queue, u);
+    Buffer<LampPlace> out(s.queue, views.size());
+    s.run("probe_lamp", views.size(), in, by, out, cl_uint(views.size()));
+    return out.download();
+}
+
 }  // namespace clume

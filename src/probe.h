@@ -113,6 +113,14 @@ public:
     std::vector<std::uint32_t> primitive_bits(std::uint32_t first, std::uint32_t key_lo, std::uint32_t key_hi, std::size_t count);
     /// Directions sampled about d: x cosine, y pdf returned, z value at the cosine, w squared length.
     std::vector<device::float4> phases(device::uint kind, float g, const float (&d)[3], std::uint32_t seed, std::size_t count);
+    /// A ray as a lamp sees it, from t0 to t1, and equiangular places on it, counted from the foot (lamp.cl).
+    struct LampView {
+        float foot, gap, t0, t1;
+    };
+    struct LampPlace {
+        float place, begin, end, span;
+    };
+    std::vector<LampPlace> lamp_places(std::span<const LampView> views, std::span<const float> u);
 
 private:
     struct Impl;

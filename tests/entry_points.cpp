@@ -63,7 +63,7 @@ std::vector<float> arguments(const Domain& d, std::size_t count) {
 /// Lights of every kind; with those of `mixed_scene` all seven.
 void add_lights(Scene& scene) {
     Light point = light_of(LightKind::point), spot = light_of(LightKind::spot), sphere = light_of(LightKind::sphere), sheet = light_of(LightKind::rectangle);
-    point.position = {1.4, 1.1, -0.6};
+    point.position = {0.2, 0.1, -0.15};  // amid medium
     point.intensity = {2, 1, 1.5};
     spot.position = {-1.5, 0.8, -1};
     spot.target = {0.1, 0, 0};
@@ -158,6 +158,15 @@ Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t cou
     keep(out, "probe_primitive_bits", probe.primitive_bits(3, 17, 19, count));
     for (const device::uint kind : {PHASE_ISOTROPIC, PHASE_HENYEY_GREENSTEIN, PHASE_RAYLEIGH})
         for (const float g : {0.0f, 0.9f, -0.4f}) keep(out, fmt::format("probe_phase {} {}", kind, g), probe.phases(kind, g, {0.48f, 0.6f, 0.64f}, 5, count));
+
+    std::vector<Probe::LampView> views;
+    std::vector<float> places;
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto t0 = static_cast<float>(random.uniform(0, 2));
+        views.push_back({static_cast<float>(random.uniform(-1, 3)), static_cast<float>(random.spread(1e-6, 2)), t0, t0 + static_cast<float>(random.spread(1e-3, 3))});
+        places.push_back(static_cast<float>(random.uniform(0, 1)));
+    }
+    keep(out, "probe_lamp", probe.lamp_places(views, places));
 
     // A group of overlapping ellipsoids for each ray.
     const std::vector<float> groups = packed(everything(false), {"decomposition", "analytic", "auto", "newton", "bvh"}).groups;
