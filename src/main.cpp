@@ -82,6 +82,7 @@ ImageMetadata describe(const Scene& scene, const RenderCommand& command, const R
     };
     std::vector<std::string> overrides;
     for (const Override& o : command.overrides) overrides.push_back(o.key + "=" + o.value);
+    if (stats.noise) metadata.emplace_back("noise", stats.noise->summary());
     if (!overrides.empty()) metadata.emplace_back("overrides", join(overrides, " "));
     if (!stats.notes.empty()) metadata.emplace_back("notes", join(stats.notes, "\n"));
     if (!stats.warnings.empty()) metadata.emplace_back("warnings", join(stats.warnings, "\n"));
@@ -114,6 +115,11 @@ int report(const RenderStats& stats) {
     if (stats.interrupted) {
         say(fmt::format("interrupted: the image holds {} samples per pixel", samples_held(stats)));
         return interrupted_exit_code;
+    }
+    if (stats.noise) {
+        say(stats.noise->summary());
+        say(fmt::format("{} samples per pixel, {:.1f} on average; the pilot took another {:.1f} %", samples_held(stats), stats.samples_mean,
+                        100 * static_cast<double>(stats.noise->pilot_paths) / std::max(1.0, static_cast<double>(stats.noise->paths))));
     }
     if (stats.time_limited) say(fmt::format("time limit reached: the image holds {} samples per pixel", samples_held(stats)));
     return stats.nonfinite_samples > 0 ? 1 : 0;
