@@ -108,6 +108,11 @@ int report(const RenderStats& stats) {
         say(fmt::format("warning: density above its bound {} times: the image may be wrong", stats.bound_violations));
     if (stats.nonfinite_samples > 0)
         say(fmt::format("warning: {} samples were not finite and count as 0", stats.nonfinite_samples));
+    if (stats.noise) {
+        say(stats.noise->summary());
+        say(fmt::format("{} samples per pixel, {:.1f} on average where there is anything; a pilot of {:.1f} % of the paths", samples_held(stats), stats.samples_mean,
+                        100 * static_cast<double>(stats.noise->pilot_paths) / std::max(1.0, static_cast<double>(stats.noise->paths + stats.noise->pilot_paths))));
+    }
     if (stats.device_lost) {
         say(fmt::format("no device is left: the image holds {} samples per pixel", samples_held(stats)));
         return 4;
@@ -115,11 +120,6 @@ int report(const RenderStats& stats) {
     if (stats.interrupted) {
         say(fmt::format("interrupted: the image holds {} samples per pixel", samples_held(stats)));
         return interrupted_exit_code;
-    }
-    if (stats.noise) {
-        say(stats.noise->summary());
-        say(fmt::format("{} samples per pixel, {:.1f} on average; the pilot took another {:.1f} %", samples_held(stats), stats.samples_mean,
-                        100 * static_cast<double>(stats.noise->pilot_paths) / std::max(1.0, static_cast<double>(stats.noise->paths))));
     }
     if (stats.time_limited) say(fmt::format("time limit reached: the image holds {} samples per pixel", samples_held(stats)));
     return stats.nonfinite_samples > 0 ? 1 : 0;
