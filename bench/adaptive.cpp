@@ -8,7 +8,9 @@
 #include <filesystem>
 
 #include "bench/sections.h"
+#include "src/adaptive.h"
 #include "src/device_camera.h"
+#include "src/device_scene.h"
 #include "src/scene_reader.h"
 
 namespace clume::bench {
@@ -18,37 +20,43 @@ struct Errors {
     double worst = 0, rms = 0;
 };
 
-/// Of the film's squares: RMS standard error over mean (over 1/16 of the image's mean where darker), its largest and its root mean
-/// square.
-Errors errors_of(const RenderImage& image) {
-    const int width = image.window.x1 - image.window.x0, height = image.window.y1 - image.window.y0;
-    double least = 0;
-    for (const float v : image.rgb) least += static_cast<double>(v) / static_cast<double>(image.rgb.size()) / 16;
-    Errors e;
-    double tiles = 0;
-    for (int ty = 0; ty < height; ty += film_tile)
-        for (int tx = 0; tx < width; tx += film_tile) {
-            double sum = 0, variance = 0, count = 0;
-            for (int y = ty; y < std::min(ty + film_tile, height); ++y)
-                for (int i = 3 * (tx + width * y); i < 3 * (std::min(tx + film_tile, width) + width * y); ++i) {
-                    sum += static_cast<double>(image.rgb[static_cast<std::size_t>(i)]);
-                    variance += static_cast<double>(image.variance[static_cast<std::size_t>(i)]);
-                    count += 1;
+/// The film's squares, by the pixels that aren't empty.
+struct Squares {
+    std::vector<device::uint> pixels;
+    std::vector<NoiseTile> tiles;
+    int width;
+
+    Squares(const Scene& scene, const RenderOptions& options) : width(scene.film.width) {
+        const CropWindow window{0, 0, scene.film.width, scene.film.height};
+        pixels = active_pixels(scene, make_device_scene(scene, options), window);
+        tiles = noise_tiles(pixels, width, window);
+    }
+
+    /// Of the squares' errors, as --noise-threshold defines them, the largest and the root mean square.
+    Errors errors(const RenderImage& image) const {
+        std::vector<TileNoise> noise;
+        for (const NoiseTile& t : tiles) {
+            TileNoise n{0, 0, 0, 2};  // the variance is the mean's: as if of one of two samples
+            for (std::uint32_t k = t.first; k < t.first + t.count; ++k)
+                for (std::size_t c = 0; c < 3; ++c) {
+                    n.mean += static_cast<double>(image.rgb[3 * pixels[k] + c]) / (3.0 * t.count);
+                    n.variance += 2 * static_cast<double>(image.variance[3 * pixels[k] + c]) / (3.0 * t.count);
                 }
-            if (!(variance > 0)) continue;
-            const double error = std::sqrt(variance / count) / std::max(sum / count, least);
-            e.worst = std::max(e.worst, error);
-            e.rms += error * error;
-            tiles += 1;
+            noise.push_back(n);
         }
-    e.rms = std::sqrt(e.rms / tiles);
-    return e;
-}
+        Errors e;
+        for (const double error : relative_errors(tiles, noise)) {
+            e.worst = std::max(e.worst, error);
+            e.rms += error * error / static_cast<double>(tiles.size());
+        }
+        e.rms = std::sqrt(e.rms);
+        return e;
+    }
+};
 
 struct Side {
     std::vector<double> seconds, worst, rms;
-    void add(const RenderResult& r, bool on_cpu) {
-        const Errors e = errors_of(r.image);
+    void add(const RenderResult& r, const Errors& e, bool on_cpu) {
         seconds.push_back(on_cpu ? r.stats.cpu_s : r.stats.render_s);  // which a busy machine disturbs less
         worst.push_back(e.worst);
         rms.push_back(e.rms);
@@ -62,6 +70,7 @@ void measure(Session& session, const std::string& name) {
     const double threshold = session.options().quick ? 0.2 : 0.1;
     constexpr std::uint32_t most = 8192;
     RenderOptions options = session.render_options();
+    const Squares squares(scene, options);
     Renderer uniform(scene, options);
     options.noise_threshold = threshold;
     Renderer adaptive(scene, options);
@@ -79,8 +88,9 @@ void measure(Session& session, const std::string& name) {
         const RenderResult r = render(adaptive, seed, most);
         const NoiseStats& noise = r.stats.noise.value();
         const double all = static_cast<double>(noise.paths + noise.pilot_paths) / adaptive.rendered_pixels();
-        own.add(r, on_cpu);
-        other.add(render(uniform, seed + 1, std::max(2u, static_cast<std::uint32_t>(std::lround(all)))), on_cpu);
+        own.add(r, squares.errors(r.image), on_cpu);
+        const RenderResult u = render(uniform, seed + 1, std::max(2u, static_cast<std::uint32_t>(std::lround(all))));
+        other.add(u, squares.errors(u.image), on_cpu);
         mean.push_back(r.stats.samples_mean);
         least.push_back(r.stats.samples_min);
         largest.push_back(r.stats.samples_max);
