@@ -22,7 +22,7 @@ namespace clume {
 namespace {
 
 constexpr const char* overview =
-    "Measures speed on one device. Sections: scenes (the renderer beside a plain host tracer), kernels, specialisation, scaling,\nwork (what an operation costs); with --study the study of strategies instead.\n"
+    "Measures speed on one device. Sections: scenes (the renderer beside a plain host tracer), kernels, specialisation, scaling,\nadaptive (what a noise threshold saves), work (what an operation costs); with --study the study of strategies instead.\n"
     "An item is called section/name: --list prints them, --filter chooses. Everything takes about ten minutes on two cores,\nthe study 15 to 30.\n";
 constexpr const char* examples =
     "Examples: clume bench --filter ^scenes/          clume bench --filter 'flight/ball.*w16'\n"
@@ -102,6 +102,7 @@ int run_bench(int argc, char** argv) {
         bench_specialisation_section(session);
         bench_lamps_section(session);
         bench_scaling_section(session);
+        bench_adaptive_section(session);
         bench_devices_section(session);
         bench_work_section(session);
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `clume bench`: the whole renderer beside the plain host tracer, its kernels one by one, what specialisation saves, and how
-// cost grows with the number of primitives, what an operation costs, and the study of strategies. docs/performance.md and
-// docs/strategies.md say what each section measures.
+// cost grows with the number of primitives, what a noise threshold saves, what an operation costs, and the study of
+// strategies. docs/performance.md and docs/strategies.md say what each section measures.
 #pragma once
 
 namespace clume {

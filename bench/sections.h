@@ -11,6 +11,7 @@ void bench_kernels_section(Session& session);  ///< kernels.cpp and groups.cpp
 void bench_specialisation_section(Session& session);
 void bench_lamps_section(Session& session);
 void bench_scaling_section(Session& session);
+void bench_adaptive_section(Session& session);
 void bench_devices_section(Session& session);
 void bench_work_section(Session& session);     ///< work_fit.cpp
 /// study.cpp; only with Options::study.

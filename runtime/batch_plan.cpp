@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Pass and batch sizes. The first pass is one unit each, which measures the items; later passes are as long as the mean
-// item needs to fill a batch on the fastest worker, and grow at most eightfold.
+// item's share needs to fill a batch on the fastest worker, and grow at most eightfold.
 #include "runtime/batch_plan.h"
 
 #include <algorithm>
@@ -17,20 +17,24 @@ constexpr double smallest_share = 1.0 / 16;  ///< of the target: batches aren't 
 }  // namespace
 
 BatchPlan::BatchPlan(const DispatchOptions& options, std::size_t workers)
-    : end_(std::max(options.begin, options.end)),
+    : begin_(options.begin),
       fixed_chunk_(options.fixed_chunk),
       target_s_(options.target_seconds),
       costs_(options.items, workers),
       live_(workers, 1),
       measured_(workers, 0),
       in_hand_(workers, 0),
-      next_(options.items, options.begin),
-      order_(options.items),
-      pass_begin_(options.begin),
-      pass_end_(options.begin) {
-    std::iota(order_.begin(), order_.end(), 0u);
-    cursor_ = order_.size();
-    if (order_.empty()) pass_end_ = end_;
+      ends_(options.items),
+      next_(options.items, options.begin) {
+    for (std::uint32_t item = 0; item < options.items; ++item) {
+        ends_[item] = options.end_of(item);
+        longest_ = std::max(longest_, ends_[item] - begin_);
+    }
+}
+
+std::uint32_t BatchPlan::goal(std::uint32_t item, std::uint32_t units_of_longest) const {
+    const std::uint64_t length = ends_[item] - begin_;
+    return begin_ + static_cast<std::uint32_t>((length * units_of_longest + longest_ - 1) / longest_);
 }
 
 double BatchPlan::live_speed() const {
@@ -46,14 +50,16 @@ double BatchPlan::seconds_left() const {
 }
 
 void BatchPlan::start_pass() {
-    const std::uint32_t last = pass_end_ - pass_begin_, left = end_ - pass_end_;
+    const std::uint32_t last = pass_end_ - pass_begin_, left = longest_ - pass_end_;
     std::uint32_t length = 1;
     if (fixed_chunk_ > 0) {
         length = fixed_chunk_;
     } else if (last > 0) {
         double fastest = 0;
         for (std::size_t w = 0; w < live_.size(); ++w) fastest = std::max(fastest, live_[w] ? costs_.speed(w) : 0);
-        const double wanted = target_s_ * fastest / std::max(costs_.mean_reference_cost(), 1e-12);
+        double cost = 0;  // of a unit of the longest, and what goes with it of the others
+        for (std::uint32_t item = 0; item < ends_.size(); ++item) cost += costs_.reference_cost(item) * (ends_[item] - begin_) / longest_;
+        const double wanted = target_s_ * fastest / std::max(cost / static_cast<double>(ends_.size()), 1e-12);
         const double most = static_cast<double>(std::min<std::uint64_t>(left, std::uint64_t(growth) * last));
         length = static_cast<std::uint32_t>(std::clamp(wanted, 1.0, std::max(most, 1.0)));
         if (left - std::min(left, length) < length / 2) length = left;  // no short pass at the end
@@ -61,6 +67,9 @@ void BatchPlan::start_pass() {
     pass_begin_ = pass_end_;
     pass_end_ += std::min(length, left);
     cursor_ = 0;
+    order_.clear();
+    for (std::uint32_t item = 0; item < next_.size(); ++item)
+        if (next_[item] < goal(item, pass_end_)) order_.push_back(item);
     if (fixed_chunk_ == 0) {
         std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
             return costs_.reference_cost(a) > costs_.reference_cost(b);
@@ -72,7 +81,7 @@ void BatchPlan::start_pass() {
 void BatchPlan::count_unassigned() {
     unassigned_ = 0;
     for (std::uint32_t item = 0; item < next_.size(); ++item)
-        unassigned_ += costs_.reference_cost(item) * static_cast<double>(end_ - next_[item]);
+        unassigned_ += costs_.reference_cost(item) * static_cast<double>(ends_[item] - next_[item]);
     for (const Batch& batch : redo_)
         unassigned_ += costs_.reference_cost(batch.item) * static_cast<double>(batch.end - batch.begin);
 }
@@ -107,10 +116,10 @@ bool BatchPlan::others_finish_first(std::size_t worker, std::uint32_t item) cons
 std::optional<Batch> BatchPlan::next(std::size_t worker) {
     const bool redo = !redo_.empty();
     if (!redo) {
-        if (cursor_ == order_.size() && pass_end_ == end_) return std::nullopt;
+        if (exhausted()) return std::nullopt;
         if (cursor_ == order_.size()) start_pass();
     }
-    const Batch source = redo ? redo_.back() : Batch{order_[cursor_], next_[order_[cursor_]], pass_end_};
+    const Batch source = redo ? redo_.back() : Batch{order_[cursor_], next_[order_[cursor_]], goal(order_[cursor_], pass_end_)};
     if (others_finish_first(worker, source.item)) return std::nullopt;
     const std::uint32_t units = batch_units(worker, source.item, source.end - source.begin);
     const Batch batch{source.item, source.begin, source.begin + units};
@@ -119,7 +128,7 @@ std::optional<Batch> BatchPlan::next(std::size_t worker) {
         if (redo_.back().begin == redo_.back().end) redo_.pop_back();
     } else {
         next_[batch.item] = batch.end;
-        if (batch.end == pass_end_) ++cursor_;
+        if (batch.end == source.end) ++cursor_;
     }
     const double cost = costs_.reference_cost(batch.item) * static_cast<double>(units);
     unassigned_ = std::max(0.0, unassigned_ - cost);

@@ -44,7 +44,7 @@ public:
         : workers_(workers), options_(options), plan_(options, workers.size()), held_(workers.size()), alive_(workers.size()) {
         for (const auto& worker : workers) report_.workers.emplace_back().name = worker->name();
         report_.units_of_item.resize(options.items);
-        if (options.end > options.begin) report_.units_total = std::uint64_t(options.items) * (options.end - options.begin);
+        for (std::uint32_t item = 0; item < options.items; ++item) report_.units_total += options.end_of(item) - options.begin;
     }
 
     /// `self` keeps this alive for threads left behind.

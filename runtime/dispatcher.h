@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Shares out work over workers, one thread each. The work is a grid: `items` × a half-open range of units; a batch is some
-// units of one item. Items advance together, pass by pass, so that whenever it stops all hold about the same number of
-// units. Nothing is said about order: what a batch yields must add up the same in any.
+// Shares out work over workers, one thread each. Each item has a half-open range of units; a batch is some units of one
+// item. Items advance together, pass by pass, so that whenever it stops all hold about the same share of their units.
+// Nothing is said about order: what a batch yields must add up the same in any.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
@@ -56,11 +57,14 @@ struct DispatchProgress {
 struct DispatchOptions {
     std::uint32_t items = 0;
     std::uint32_t begin = 0, end = 0;      ///< units of every item
+    std::vector<std::uint32_t> ends;       ///< instead of `end`, one per item; empty: `end` for all
     std::uint32_t fixed_chunk = 0;         ///< units per batch; 0: by measurement
     double target_seconds = 0.15;          ///< per batch; well under a display driver's watchdog
     double hang_seconds = 0;               ///< a worker silent for so long is given up; 0: none ever is
     std::function<bool()> stop;            ///< asked before each batch, one thread at a time; true: start no more
     std::function<void(const DispatchProgress&)> progress;  ///< called by dispatch's caller's thread, every 0.2 s and at the end
+
+    std::uint32_t end_of(std::uint32_t item) const { return std::max(begin, ends.empty() ? end : ends[item]); }
 };
 
 struct WorkerReport {

@@ -8,15 +8,11 @@
 #include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <array>
-#include <cctype>
-#include <charconv>
-#include <cmath>
 #include <map>
 #include <numeric>
 
 #include "src/bake.h"
 #include "src/error.h"
-#include "src/memory_budget.h"
 #include "src/scene_schema.h"
 #include "src/voxel_writer.h"
 
@@ -46,28 +42,6 @@ constexpr std::array key_flags{
 constexpr const char* overview = "clume renders mixtures of ellipsoids (smoke, fire, clouds) by path tracing, on any OpenCL device.\n";
 constexpr const char* exit_codes =
     "Exit codes: 0 done, 1 render failed, 2 wrong command line, 3 wrong scene or asset, 4 no such device or none left, 130 interrupted.";
-
-/// What the strings of `render` are parsed into before they are checked.
-struct RenderTexts {
-    std::string scene, output, sample_range, crop, stats_json, memory_limit;
-    std::vector<std::string> definitions, devices;
-    std::optional<double> time_limit_s, kernel_timeout_s;
-    std::optional<int> cpu_split;
-};
-
-/// `text` as numbers with `separator` between them; false unless there are exactly `count` of them and nothing else.
-template <class Number, std::size_t count>
-bool parse_list(std::string_view text, char separator, std::array<Number, count>& values) {
-    for (std::size_t i = 0; i < count; ++i) {
-        const std::size_t end = std::min(text.find(separator), text.size());
-        const auto [stop, error] = std::from_chars(text.data(), text.data() + end, values[i]);
-        if (error != std::errc() || stop != text.data() + end) return false;
-        const bool last = i + 1 == count;
-        if (last != (end == text.size())) return false;
-        text.remove_prefix(last ? end : end + 1);
-    }
-    return true;
-}
 
 Override parse_definition(const std::string& text) {
     const std::size_t equals = text.find('=');
@@ -153,45 +127,6 @@ std::string command_line(int argc, const char* const* argv) {
     return line;
 }
 
-RenderCommand check_render(RenderTexts texts, RenderCommand command) {
-    if (texts.scene.empty()) throw UsageError("render: which scene? Such as: clume render scenes/plume.json");
-    command.scene = texts.scene;
-    command.exr = texts.output.empty() ? command.scene.stem().string() + ".exr" : texts.output;
-    std::string extension = command.exr.extension().string();
-    for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    if (extension != ".exr")
-        throw UsageError("-o " + texts.output + ": must end in .exr (the PNG preview is written beside it)");
-    if (!texts.stats_json.empty()) command.stats_json = texts.stats_json;
-    if (command.stats_json && (*command.stats_json == command.exr || *command.stats_json == command.png()))
-        throw UsageError("--stats-json " + texts.stats_json + ": is the name of the image");
-
-    if (!texts.memory_limit.empty()) command.memory_limit = parse_byte_size("--memory-limit", texts.memory_limit);
-    RenderOptions& options = command.options;
-    std::array<std::uint32_t, 2> range{};
-    if (!texts.sample_range.empty()) {
-        if (!parse_list(texts.sample_range, ':', range) || range[0] >= range[1])
-            throw UsageError("--sample-range " + texts.sample_range + ": must be A:B with 0 <= A < B (B itself is left out)");
-        options.sample_begin = range[0];
-        options.sample_end = range[1];
-    }
-    std::array<int, 4> crop{};
-    if (!texts.crop.empty()) {
-        if (!parse_list(texts.crop, ',', crop) || crop[0] < 0 || crop[1] < 0 || crop[0] >= crop[2] || crop[1] >= crop[3])
-            throw UsageError("--crop " + texts.crop + ": must be x0,y0,x1,y1 in pixels with 0 <= x0 < x1 and 0 <= y0 < y1");
-        options.crop = CropWindow{crop[0], crop[1], crop[2], crop[3]};
-    }
-    if (texts.time_limit_s && !(*texts.time_limit_s > 0 && std::isfinite(*texts.time_limit_s)))
-        throw UsageError("--time-limit: must be a positive number of seconds");
-    options.time_limit_s = texts.time_limit_s;
-    options.kernel_timeout_s = texts.kernel_timeout_s.value_or(options.kernel_timeout_s);
-    if (!(options.kernel_timeout_s >= 0 && options.kernel_timeout_s <= 1e6)) throw UsageError("--kernel-timeout: must be 0 (never) to 1e6 seconds");
-    if (texts.cpu_split && *texts.cpu_split < 1) throw UsageError("--cpu-split: must be at least 1");
-    options.cpu_split = texts.cpu_split.value_or(0);
-    options.devices = texts.devices;
-    if (!(std::abs(command.exposure_stops) <= 100)) throw UsageError("--exposure: must lie between -100 and 100 stops");
-    return command;
-}
-
 BakeCommand check_bake(const std::string& scene, const std::string& output, std::optional<long long> resolution) {
     if (scene.empty()) throw UsageError("bake: which scene? Such as: clume bake scenes/plume.json --resolution 256 -o plume.nvdb");
     if (output.empty()) throw UsageError("bake: into which file? Such as: -o smoke.vol, smoke.nvdb or smoke.vdb");
@@ -267,6 +202,8 @@ Command parse_command_line(int argc, const char* const* argv) {
     render->add_option("--sample-range", texts.sample_range, "only samples A to B - 1 of each pixel")->type_name("A:B");
     render->add_option("--crop", texts.crop, "only this part of the film, half-open")->type_name("x0,y0,x1,y1");
     render->add_option("--time-limit", texts.time_limit_s, "stop after this long and write what is done")->type_name("SECONDS");
+    render->add_option("--noise-threshold", texts.noise_threshold, "give each tile only the samples it needs for this standard error relative to its mean, such as 0.02; --spp at most")
+        ->type_name("E");
     render->add_option("--kernel-timeout", texts.kernel_timeout_s, "a device silent for so long hangs and is given up; default 120; 0: never")->type_name("SECONDS");
     render->add_option("--memory-limit", texts.memory_limit, "most memory to use, such as 512M or 2G; default: what is free")->type_name("SIZE");
     render->add_option("--device", texts.devices, "id, part of a name, cpu, gpu or all; several with commas or repeated")
@@ -370,7 +307,7 @@ Command parse_command_line(int argc, const char* const* argv) {
 
     if (render->parsed()) {
         command.overrides = collect_overrides(*render, render_definition, keys);
-        return check_render(std::move(texts), std::move(command));
+        return check_render(texts, std::move(command));
     }
     if (compare->parsed()) {
         CompareCommand compare_command = check_compare(compare_texts);

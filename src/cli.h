@@ -73,6 +73,17 @@ using Command = std::variant<PrintCommand, RenderCommand, CompareCommand, Device
 /// are not parsed here.
 Command parse_command_line(int argc, const char* const* argv);
 
+/// What is typed after `render`'s flags, before it is checked.
+struct RenderTexts {
+    std::string scene, output, sample_range, crop, stats_json, memory_limit;
+    std::vector<std::string> definitions, devices;
+    std::optional<double> time_limit_s, noise_threshold, kernel_timeout_s;
+    std::optional<int> cpu_split;
+};
+
+/// Adds them to a command that holds the rest. Throws UsageError.
+RenderCommand check_render(const RenderTexts& texts, RenderCommand command);
+
 /// What is typed after `compare`'s flags, before it is checked.
 struct CompareTexts {
     std::string scene, output, strategies, spp, reference;

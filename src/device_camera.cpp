@@ -156,11 +156,10 @@ std::vector<device::uint> active_pixels(const Scene& scene, const DeviceScene& d
     }
     const std::vector<bool> covered = coverage.covered();
     std::vector<device::uint> pixels;
-    constexpr int tile = 16;
-    for (int ty = window.y0; ty < window.y1; ty += tile)
-        for (int tx = window.x0; tx < window.x1; tx += tile)
-            for (int y = ty; y < std::min(ty + tile, window.y1); ++y)
-                for (int x = tx; x < std::min(tx + tile, window.x1); ++x)
+    for (int ty = window.y0; ty < window.y1; ty += film_tile)
+        for (int tx = window.x0; tx < window.x1; tx += film_tile)
+            for (int y = ty; y < std::min(ty + film_tile, window.y1); ++y)
+                for (int x = tx; x < std::min(tx + film_tile, window.x1); ++x)
                     if (covered[static_cast<std::size_t>(x - window.x0) + static_cast<std::size_t>(coverage.stride()) * static_cast<std::size_t>(y - window.y0)])
                         pixels.push_back(static_cast<device::uint>(x + scene.film.width * y));
     return pixels;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <numeric>
 
 #include "runtime/program.h"
 
@@ -25,6 +26,8 @@ int vector_width_of(const DeviceInfo& info, int wanted) { return wanted > 0 ? wa
 DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene, const std::vector<device::uint>& pixels,
                                const std::vector<Tile>& tiles, int vector_width, bool optimised)
     : queue_(info),
+      active_(pixels),
+      order_(pixels.size()),
       tiles_(tiles),
       params_(scene.params),
       scene_(queue_, scene),
@@ -33,6 +36,7 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
       raised_(scene.learned.size(), 0.0f),
       lanes_(scene.lanes ? static_cast<std::size_t>(vector_width_of(info, vector_width)) : 1),
       wanted_items_(items_wanted(info)) {
+    std::iota(order_.begin(), order_.end(), 0u);
     ProgramOptions options;
     options.optimised = optimised;
     for (const auto& [name, value] : scene.defines) options.define(name, value);
@@ -66,6 +70,12 @@ void DeviceRenderer::aim(FilmSums& film, std::uint64_t seed) {
     aimed_ = false;
 }
 
+void DeviceRenderer::choose(std::vector<std::uint32_t> order, std::vector<Tile> tiles) {
+    order_ = std::move(order);
+    tiles_ = std::move(tiles);
+    chosen_ = false;
+}
+
 void DeviceRenderer::set_learned(std::span<const float> bounds, bool explore) {
     learned_.assign(bounds.begin(), bounds.end());
     raised_.assign(bounds.size(), 0.0f);
@@ -76,6 +86,12 @@ void DeviceRenderer::set_learned(std::span<const float> bounds, bool explore) {
 void DeviceRenderer::upload_changes() {
     if (!aimed_) scene_.params.upload(std::span(&params_, 1));
     aimed_ = true;
+    if (!chosen_) {
+        std::vector<device::uint> pixels;
+        for (const std::uint32_t k : order_) pixels.push_back(active_[k]);
+        pixels_.upload(std::span<const device::uint>(pixels));
+    }
+    chosen_ = true;
     if (learned_.empty()) return;
     scene_.learned.upload(learned_);
     scene_.raised.upload(std::vector<device::uint>(learned_.size()));
@@ -137,7 +153,7 @@ void DeviceRenderer::run(const Batch& batch) {
 
 void DeviceRenderer::commit(const Batch& batch) {
     assert(film_ != nullptr);
-    for (const Piece& p : pieces_) film_->add(p.first, p.count, p.splits, batch.end - batch.begin, p.sums);
+    for (const Piece& p : pieces_) film_->add(std::span(order_).subspan(p.first, p.count), p.splits, batch.end - batch.begin, p.sums);
     pieces_.clear();
     for (std::size_t i = 0; i < found_.size(); ++i) raised_[i] = std::max(raised_[i], std::bit_cast<float>(found_[i]));
 }

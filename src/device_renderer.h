@@ -15,7 +15,7 @@
 
 namespace clume {
 
-/// Half-open range of the list of active pixels.
+/// Half-open range of the list of active pixels, or of an order of them.
 struct Tile {
     std::uint32_t first = 0, count = 0;
 };
@@ -33,6 +33,9 @@ public:
     /// Batches from now on use `seed` and add to `film`, which must outlive them.
     void aim(FilmSums& film, std::uint64_t seed);
 
+    /// Batches from now on are of these tiles, ranges of `order`: places in the list of active pixels, none twice.
+    void choose(std::vector<std::uint32_t> order, std::vector<Tile> tiles);
+
     /// Bounds of `progressive` for the batches from now on, one per leaf, and whether rays look into every cell that they cross;
     /// and the highest densities that batches have found above those bounds since.
     void set_learned(std::span<const float> bounds, bool explore);
@@ -47,7 +50,7 @@ public:
     void commit(const Batch& batch) override;
 
 private:
-    /// Sums of the active pixels [first, first + count).
+    /// Sums of the pixels [first, first + count) of the order.
     struct Piece {
         std::size_t first, count, splits;
         std::vector<std::uint64_t> sums;
@@ -60,7 +63,9 @@ private:
     void upload_changes();
 
     Queue queue_;
-    const std::vector<Tile> tiles_;
+    const std::vector<device::uint> active_;  ///< film index of each active pixel
+    std::vector<std::uint32_t> order_;
+    std::vector<Tile> tiles_;
     FilmSums* film_ = nullptr;
     device::RenderParams params_;
     SceneBuffers scene_;
@@ -74,6 +79,7 @@ private:
     std::vector<device::uint> found_;        ///< raised bounds after the batch last run
     std::vector<float> raised_;
     bool aimed_ = false;                     ///< params_ are on the device
+    bool chosen_ = true;                     ///< so are the pixels in their order
     std::size_t lanes_;                      ///< rows of sums that a work-item fills
     std::size_t wanted_items_;               ///< rows that keep the device busy
     std::size_t most_items_ = SIZE_MAX;      ///< work-items that fit its memory, as far as known

@@ -10,11 +10,11 @@ FilmSums::FilmSums(std::size_t active_pixels, int channels, double scale) : pixe
 
 std::uint64_t FilmSums::bytes_per_pixel() { return sizeof(Sums); }
 
-void FilmSums::add(std::size_t first, std::size_t count, std::size_t splits, std::uint32_t samples, std::span<const std::uint64_t> sums) {
+void FilmSums::add(std::span<const std::uint32_t> active, std::size_t splits, std::uint32_t samples, std::span<const std::uint64_t> sums) {
     const std::lock_guard lock(mutex_);
-    for (std::size_t i = 0; i < count * splits; ++i) {
+    for (std::size_t i = 0; i < active.size() * splits; ++i) {
         const std::uint64_t* w = sums.data() + i * FILM_WORDS;
-        Sums& p = pixels_[first + i % count];
+        Sums& p = pixels_[active[i % active.size()]];
         for (int c = 0; c < channels_; ++c) {
             p.x[c] += Sum{w[4 * c]} | Sum{w[4 * c + 1]} << 64;
             p.xx[c] += Sum{w[4 * c + 2]} | Sum{w[4 * c + 3]} << 64;
@@ -26,7 +26,8 @@ void FilmSums::add(std::size_t first, std::size_t count, std::size_t splits, std
         for (int k = 0; k < WORK_KINDS; ++k) work_[static_cast<std::size_t>(k)] += w[FILM_WORK + k];
         p.tests += 16 * w[FILM_WORK + WORK_GROUPS] + w[FILM_WORK + WORK_PRIMITIVES] + w[FILM_WORK + WORK_VOXELS];
     }
-    for (std::size_t i = 0; i < count; ++i) pixels_[first + i].samples += samples;
+    for (const std::uint32_t k : active) pixels_[k].samples += samples;
+    paths_ += active.size() * std::uint64_t{samples};
 }
 
 FilmSums::Pixel FilmSums::pixel(std::size_t active) const {

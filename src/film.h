@@ -2,6 +2,7 @@
 // The film on the host: exact 128-bit sums per active pixel, to which batches add in any order with the same result.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <span>
@@ -18,8 +19,8 @@ public:
     FilmSums(std::size_t active_pixels, int channels, double scale);
 
     /// Adds one batch: `sums` holds FILM_WORDS words for each of pixels × splits work-items (item = split · count + pixel),
-    /// for the active pixels [first, first + count), `samples` more samples each. Thread-safe.
-    void add(std::size_t first, std::size_t count, std::size_t splits, std::uint32_t samples, std::span<const std::uint64_t> sums);
+    /// for the active pixels that are listed, `samples` more samples each. Thread-safe.
+    void add(std::span<const std::uint32_t> active, std::size_t splits, std::uint32_t samples, std::span<const std::uint64_t> sums);
 
     static std::uint64_t bytes_per_pixel();
 
@@ -30,6 +31,8 @@ public:
     };
     Pixel pixel(std::size_t active) const;
 
+    std::size_t size() const { return pixels_.size(); }
+    std::uint64_t paths() const { return paths_; }  ///< samples of all active pixels
     std::uint64_t nonfinite() const { return nonfinite_; }
     std::uint64_t violations() const { return violations_; }
     double excess() const { return static_cast<double>(excess_) * 0x1p-20; }  ///< Σ over densities above their bound of (density − bound) / bound
@@ -46,6 +49,7 @@ private:
     std::vector<Sums> pixels_;
     int channels_;
     double scale_;
+    std::atomic<std::uint64_t> paths_ = 0;
     std::uint64_t nonfinite_ = 0, violations_ = 0, excess_ = 0;
     WorkCounts work_{};
 };

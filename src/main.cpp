@@ -82,6 +82,7 @@ ImageMetadata describe(const Scene& scene, const RenderCommand& command, const R
     };
     std::vector<std::string> overrides;
     for (const Override& o : command.overrides) overrides.push_back(o.key + "=" + o.value);
+    if (stats.noise) metadata.emplace_back("noise", stats.noise->summary());
     if (!overrides.empty()) metadata.emplace_back("overrides", join(overrides, " "));
     if (!stats.notes.empty()) metadata.emplace_back("notes", join(stats.notes, "\n"));
     if (!stats.warnings.empty()) metadata.emplace_back("warnings", join(stats.warnings, "\n"));
@@ -107,6 +108,11 @@ int report(const RenderStats& stats) {
         say(fmt::format("warning: density above its bound {} times: the image may be wrong", stats.bound_violations));
     if (stats.nonfinite_samples > 0)
         say(fmt::format("warning: {} samples were not finite and count as 0", stats.nonfinite_samples));
+    if (stats.noise) {
+        say(stats.noise->summary());
+        say(fmt::format("{} samples per pixel, {:.1f} on average where there is anything; a pilot of {:.1f} % of the paths", samples_held(stats), stats.samples_mean,
+                        100 * static_cast<double>(stats.noise->pilot_paths) / std::max(1.0, static_cast<double>(stats.noise->paths + stats.noise->pilot_paths))));
+    }
     if (stats.device_lost) {
         say(fmt::format("no device is left: the image holds {} samples per pixel", samples_held(stats)));
         return 4;

@@ -36,6 +36,7 @@ PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodP
         RenderOptions o = options;
         o.count_work = true;
         o.crop.reset();
+        o.noise_threshold.reset();
         o.most_pixels = kPixels;
         Renderer renderer(with_pair(scene, pair), o);
         Accumulation film = renderer.start(scene.render.seed, kFirstSample);

@@ -18,6 +18,7 @@
 #include "src/error.h"
 #include "src/film.h"
 #include "src/memory_budget.h"
+#include "src/renderer_impl.h"
 #include "src/self_test.h"
 
 namespace clume {
@@ -77,18 +78,18 @@ RenderImage develop(const Film& size, const glm::dvec3& b, const CropWindow& w, 
 }
 
 /// Whether what rendering takes fits: the scene's copies on CPU devices, film and image, batches, compilers.
-void check_budget(const Scene& scene, const DeviceScene& device, const std::vector<DeviceInfo>& devices, const std::vector<Tile>& tiles, std::uint64_t active_pixels, std::uint64_t all_pixels) {
+void check_budget(const Scene& scene, const DeviceScene& device, const std::vector<DeviceInfo>& devices, const std::vector<Tile>& tiles, std::uint64_t active_pixels, std::uint64_t all_pixels, bool noise_pilot) {
     constexpr std::uint64_t compiler_bytes = 200'000'000;  // of an OpenCL implementation that builds the programs inside this process
     std::uint64_t copies = 0, batches = 0;
     for (const DeviceInfo& d : devices) {
         if (d.type == "cpu") copies += device.byte_size() + 4 * active_pixels;
         batches += DeviceRenderer::batch_bytes(d, tiles);
     }
-    const std::uint64_t films = device.strategy == "progressive" ? 2 : 1;  // one for what the image does not hold
+    const std::uint64_t films = device.strategy == "progressive" || noise_pilot ? 2 : 1;  // one for what the image does not hold
     require_memory(scene.path, {{"compilers", compiler_bytes},
                                 {"the scene on CPU devices", copies},
                                 {"batches", batches},
-                                {"film", active_pixels * (films * FilmSums::bytes_per_pixel() + 4)},
+                                {"film", active_pixels * (films * FilmSums::bytes_per_pixel() + 4 + 8 * devices.size())},
                                 {"image", all_pixels * image_bytes}});
 }
 
@@ -125,19 +126,6 @@ std::vector<std::pair<std::string, std::string>> explain(const Scene& scene, con
     return make_device_scene(scene, options).explain;
 }
 
-struct Accumulation::State {
-    std::uint64_t seed;
-    std::uint32_t begin, end;
-    FilmSums film;
-    std::vector<DeviceShare> devices;
-    double render_s = 0, cpu_s = 0;
-    bool interrupted = false, time_limited = false, device_lost = false;
-    std::vector<float> learned{};  ///< bounds of `progressive`; empty before the first pass
-    std::vector<float> raised{};   ///< the highest densities found above them by any device
-
-    bool stopped() const { return interrupted || time_limited || device_lost; }
-};
-
 Accumulation::Accumulation(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Accumulation::~Accumulation() = default;
 Accumulation::Accumulation(Accumulation&&) noexcept = default;
@@ -147,30 +135,6 @@ std::uint32_t Accumulation::begin() const { return state_->begin; }
 std::uint32_t Accumulation::end() const { return state_->end; }
 double Accumulation::render_s() const { return state_->render_s; }
 bool Accumulation::complete() const { return !(state_->interrupted || state_->time_limited || state_->device_lost); }
-
-struct Renderer::Impl {
-    Film film;
-    glm::dvec3 background{0};
-    RenderOptions options;
-    CropWindow window;
-    RenderStats setup;
-    std::vector<device::uint> pixels;
-    std::vector<Tile> tiles;
-    int channels = 3;
-    double film_scale = 1;
-    std::vector<float> first_bounds;               ///< of `progressive`; empty for other strategies
-    std::set<std::string> told_short_of_memory;
-    Workers workers;                               ///< DeviceRenderers; a device that fails is dropped for good
-
-    std::uint64_t all_pixels() const {
-        return static_cast<std::uint64_t>(window.x1 - window.x0) * static_cast<std::uint64_t>(window.y1 - window.y0);
-    }
-    void make_workers(const std::vector<DeviceInfo>& devices, const std::shared_ptr<const DeviceScene>& device);
-    /// Samples [begin, end) of every tile, by all devices.
-    void run_pass(Accumulation::State& a, std::uint32_t begin, std::uint32_t end, const RunControl& control);
-    /// The same for `progressive`: passes under bounds that are frozen in each and raised after it.
-    void run_learning(Accumulation::State& a, std::uint32_t end, const RunControl& control);
-};
 
 void Renderer::Impl::make_workers(const std::vector<DeviceInfo>& devices, const std::shared_ptr<const DeviceScene>& device) {
     // Compilers run here, which may take far longer than a kernel.
@@ -195,91 +159,6 @@ void Renderer::Impl::make_workers(const std::vector<DeviceInfo>& devices, const 
     }
     if (workers.empty()) throw DeviceError("no device is left:\n  " + fmt::format("{}", fmt::join(setup.warnings, "\n  ")));
     setup.compile_s = seconds_since(start);
-}
-
-void Renderer::Impl::run_pass(Accumulation::State& a, std::uint32_t begin, std::uint32_t end, const RunControl& control) {
-    for (const auto& w : workers) static_cast<DeviceRenderer&>(*w).aim(a.film, a.seed);
-    const auto start = Clock::now();
-    const std::clock_t cpu_start = std::clock();
-    const auto stop_asked = [&] { return control.stop && control.stop->load(); };
-    DispatchOptions o;
-    o.items = static_cast<std::uint32_t>(tiles.size());
-    o.begin = begin;
-    o.end = end;
-    o.fixed_chunk = options.batch_samples;
-    o.hang_seconds = options.kernel_timeout_s;
-    o.stop = [&] { return stop_asked() || (control.time_limit_s && seconds_since(start) >= *control.time_limit_s); };
-    o.progress = [&](const DispatchProgress& p) {
-        const double share = static_cast<double>(p.units_done) / static_cast<double>(std::max<std::uint64_t>(1, p.units_total));
-        const auto total = all_pixels() * (end - begin);
-        const auto done = static_cast<std::uint64_t>(share * static_cast<double>(total));
-        if (control.progress) control.progress({done, total, p.elapsed_s, p.elapsed_s > 0 ? static_cast<double>(done) / p.elapsed_s / 1e6 : 0});
-    };
-    const DispatchReport report = dispatch(workers, o);
-    a.render_s += seconds_since(start);
-    a.cpu_s += static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
-    setup.warnings.insert(setup.warnings.end(), report.warnings.begin(), report.warnings.end());
-    for (std::size_t k = report.workers.size(); k-- > 0;) {
-        const WorkerReport& w = report.workers[k];
-        const auto share = std::find_if(a.devices.begin(), a.devices.end(), [&](const DeviceShare& d) { return d.name == w.name; });
-        if (share != a.devices.end()) share->busy_s += w.busy_s;
-        else a.devices.insert(a.devices.begin(), DeviceShare{w.name, 0, w.busy_s});
-        const auto& renderer = static_cast<const DeviceRenderer&>(*workers[k]);
-        if (const std::size_t items = renderer.short_of_memory(); items > 0 && told_short_of_memory.insert(w.name).second)
-            setup.warnings.push_back(fmt::format("device {} is short of memory: batches of at most {} paths at a time", w.name, items));
-        for (std::size_t i = 0; i < a.raised.size(); ++i) a.raised[i] = std::max(a.raised[i], renderer.raised()[i]);
-        if (w.hung) note_hang(w.name);
-        if (w.dropped) workers.erase(workers.begin() + static_cast<std::ptrdiff_t>(k));
-    }
-    if (report.failed && report.units_done == 0 && begin == a.begin)
-        throw DeviceError("every device failed:\n  " + fmt::format("{}", fmt::join(report.warnings, "\n  ")));
-    a.device_lost = a.device_lost || report.failed;
-    a.interrupted = a.interrupted || (report.stopped && stop_asked());
-    a.time_limited = a.time_limited || (report.stopped && !stop_asked());
-}
-
-// A first look at how high the density goes: passes that the image does not hold, until little exceeds its bound.
-// Then passes that double, each under what all before it have found, so that the share of the image made under low bounds
-// vanishes. Everything is a function of seed and sample numbers, and so are the bounds: a pass that ends early goes on under
-// the same ones the next time.
-void Renderer::Impl::run_learning(Accumulation::State& a, std::uint32_t end, const RunControl& control) {
-    // Optical depth left out, of the bounds'. Not the share of look-ups above their bound: where bounds are far too low there
-    // are hardly any look-ups, and those that are stand for much.
-    constexpr double enough = 1e-3;
-    constexpr float margin = 1.25f;      // over what was found: the highest density is seldom hit
-    constexpr std::uint32_t first_warm_up_sample = 0x80000000u;
-    const auto run = [&](Accumulation::State& film, std::uint32_t begin, std::uint32_t pass_end, bool explore) {
-        film.raised.resize(first_bounds.size());
-        for (const auto& w : workers) static_cast<DeviceRenderer&>(*w).set_learned(a.learned, explore);
-        run_pass(film, begin, pass_end, control);
-    };
-    const auto learn = [&](const Accumulation::State& film) {
-        for (std::size_t i = 0; i < a.learned.size(); ++i) a.learned[i] = std::max(a.learned[i], margin * film.raised[i]);
-    };
-    if (a.learned.empty()) {
-        a.learned = first_bounds;
-        const auto samples = static_cast<std::uint32_t>(std::max<std::size_t>(1, 16384 / pixels.size()));
-        for (int k = 0; k < options.progressive_warm_up; ++k) {
-            const std::uint32_t begin = first_warm_up_sample + static_cast<std::uint32_t>(k) * samples;
-            Accumulation::State scratch{a.seed, begin, begin, FilmSums(pixels.size(), channels, film_scale), {}};
-            run(scratch, begin, begin + samples, true);
-            learn(scratch);
-            a.render_s += scratch.render_s;
-            a.cpu_s += scratch.cpu_s;
-            a.interrupted = scratch.interrupted;
-            a.time_limited = scratch.time_limited;
-            a.device_lost = scratch.device_lost;
-            if (a.stopped() || scratch.film.excess() <= enough * static_cast<double>(scratch.film.work()[WORK_DENSITIES])) break;
-        }
-    }
-    while (a.end < end && !a.stopped()) {
-        const std::uint32_t done = a.end - a.begin;
-        const std::uint64_t pass_end = std::uint64_t{a.begin} + (done == 0 ? 1 : 2 * std::uint64_t{std::bit_floor(done)});
-        const auto stop = static_cast<std::uint32_t>(std::min<std::uint64_t>(end, pass_end));
-        run(a, a.end, stop, false);
-        a.end = stop;
-        if (stop == pass_end) learn(a);
-    }
 }
 
 Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_unique<Impl>()) {
@@ -319,7 +198,8 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
         impl_->pixels = std::move(some);
     }
     impl_->tiles = make_tiles(impl_->pixels.size(), devices);
-    check_budget(scene, device, devices, impl_->tiles, impl_->pixels.size(), impl_->all_pixels());
+    check_budget(scene, device, devices, impl_->tiles, impl_->pixels.size(), impl_->all_pixels(), o.noise_threshold.has_value());
+    if (o.noise_threshold) impl_->noise = noise_tiles(impl_->pixels, scene.film.width, impl_->window);
     stats.empty_pixels = impl_->all_pixels() - impl_->pixels.size();
     const bool grey = std::find(device.defines.begin(), device.defines.end(), std::pair<std::string, std::string>("CLUME_CHANNELS", "1")) != device.defines.end();
     impl_->channels = grey ? 1 : 3;
@@ -337,14 +217,33 @@ std::uint32_t Renderer::rendered_pixels() const { return static_cast<std::uint32
 
 Accumulation Renderer::start(std::uint64_t seed, std::uint32_t begin) const {
     return Accumulation(std::unique_ptr<Accumulation::State>(
-        new Accumulation::State{seed, begin, begin, FilmSums(impl_->pixels.size(), impl_->channels, impl_->film_scale), {}}));
+        new Accumulation::State{seed, begin, begin, FilmSums(impl_->pixels.size(), impl_->channels, impl_->film_scale)}));
 }
 
 void Renderer::extend(Accumulation& accumulation, std::uint32_t end, const RunControl& control) {
     Accumulation::State& a = *accumulation.state_;
-    if (end <= a.end) return;
-    if (!impl_->tiles.empty()) impl_->first_bounds.empty() ? impl_->run_pass(a, a.end, end, control) : impl_->run_learning(a, end, control);
-    a.end = end;
+    if (end > a.end) impl_->run(a, end, control);
+}
+
+NoiseStats Renderer::Impl::noise_of(const Accumulation::State& a) const {
+    NoiseStats stats{*options.noise_threshold, static_cast<std::uint32_t>(noise.size()), 0, 0, 0, a.film.paths(), a.noise_pilot_paths};
+    const std::vector<TileNoise> held = measure_noise(noise, a.film);
+    const std::vector<double> errors = relative_errors(noise, held);
+    for (std::size_t t = 0; t < errors.size(); ++t) {
+        stats.worst = std::max(stats.worst, errors[t]);
+        if (errors[t] <= stats.threshold) continue;
+        ++stats.above;
+        stats.capped += held[t].samples == a.end - a.begin;
+    }
+    return stats;
+}
+
+std::string NoiseStats::summary() const {
+    std::string text = fmt::format("noise threshold {:g}: ", threshold);
+    if (tiles == 0) return text + "nothing is noisy";
+    text += above == 0 ? fmt::format("all {} tiles are within it", tiles) : fmt::format("{} of {} tiles are above it", above, tiles);
+    if (capped > 0) text += fmt::format(", {} of them for want of samples (--spp)", capped);
+    return text + fmt::format("; the noisiest has {:.3g}", worst);
 }
 
 RenderResult Renderer::result(const Accumulation& accumulation) const {
@@ -366,8 +265,11 @@ RenderResult Renderer::result(const Accumulation& accumulation) const {
         stats.samples_min = std::min(stats.samples_min, n);
         stats.samples_max = std::max(stats.samples_max, n);
     }
+    // A pixel that is known counts as one without noise.
     if (impl_->tiles.empty()) stats.samples_max = empty_samples;
-    else empty_samples = stats.samples_max;
+    else empty_samples = impl_->options.noise_threshold ? stats.samples_min : stats.samples_max;
+    if (!impl_->pixels.empty()) stats.samples_mean = static_cast<double>(active_paths) / static_cast<double>(impl_->pixels.size());
+    if (impl_->options.noise_threshold) stats.noise = impl_->noise_of(a);
     stats.paths = active_paths + stats.empty_pixels * empty_samples;
     stats.nonfinite_samples = a.film.nonfinite();
     stats.work = a.film.work();

@@ -31,6 +31,7 @@ struct RenderOptions {
     std::optional<CropWindow> crop;            ///< default: the whole film
     double kernel_timeout_s = 120;             ///< a device that gives no sign for so long hangs and is given up; 0: never
     std::optional<double> time_limit_s;        ///< stop handing out batches after this long; the image holds what was done
+    std::optional<double> noise_threshold;     ///< > 0: a tile of the film gets the samples it needs for that relative error (src/adaptive.h), no more
     std::uint32_t batch_samples = 0;           ///< samples of a pixel per batch; 0: sized to 100–200 ms by measurement
     int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own
     std::uint32_t most_pixels = 0;             ///< > 0: a pilot: at most so many of the pixels that meet something, by a program that is sooner built
@@ -53,6 +54,18 @@ struct RenderImage {
     std::vector<float> variance;               ///< of the mean, 3 per pixel (NaN-free; 0 with fewer than 2 samples)
     std::vector<std::uint32_t> samples;        ///< samples held, 1 per pixel
     std::vector<std::uint64_t> tests;          ///< primitives (or voxels) tested, 1 per pixel; empty unless counted
+};
+
+/// What became of RenderOptions::noise_threshold, by the variance of the samples that the image holds.
+struct NoiseStats {
+    double threshold = 0;
+    std::uint32_t tiles = 0;                   ///< of the film, as far as it isn't empty
+    std::uint32_t above = 0;                   ///< tiles with more noise than that
+    std::uint32_t capped = 0;                  ///< of these, how many hold as many samples as were allowed
+    double worst = 0;                          ///< relative error of the noisiest tile
+    std::uint64_t paths = 0;                   ///< of these tiles
+    std::uint64_t pilot_paths = 0;             ///< that the image does not hold
+    std::string summary() const;               ///< one line
 };
 
 struct DeviceShare {
@@ -78,6 +91,8 @@ struct RenderStats {
     bool interrupted = false, time_limited = false;
     bool device_lost = false;                  ///< no device was left before the end; the image holds what was done
     std::uint32_t samples_min = 0, samples_max = 0;  ///< held per pixel
+    double samples_mean = 0;                   ///< over the pixels that are not empty
+    std::optional<NoiseStats> noise;           ///< with a threshold
     std::vector<std::string> notes;            ///< what a strategy has to say of this image, such as how often a learned bound was too low
     std::vector<std::string> warnings;         ///< e.g. a dropped device, a device outside the bit-exact set
     std::vector<std::pair<std::string, std::string>> explain;  ///< feature → what the program does about it
@@ -114,7 +129,7 @@ public:
     std::uint32_t begin() const;  ///< samples [begin, end) were asked for
     std::uint32_t end() const;
     double render_s() const;      ///< spent rendering them, all runs together
-    bool complete() const;        ///< no run was stopped before its end: every pixel holds end − begin samples
+    bool complete() const;        ///< no run was stopped before its end: every pixel holds end − begin samples, or what its noise asks for
 
 private:
     friend class Renderer;
@@ -136,8 +151,9 @@ public:
 
     /// An empty film, whose first sample is to be `begin`.
     Accumulation start(std::uint64_t seed, std::uint32_t begin = 0) const;
-    /// Runs samples [accumulation.end(), end). Only this is in stats.render_s. Throws DeviceError if no device is left and
-    /// the film is empty.
+    /// Runs samples [accumulation.end(), end). Only this is in stats.render_s. With a noise threshold the first call decides
+    /// how many samples each tile gets, `end` at most; later ones add nothing. Throws DeviceError if no device is left and the
+    /// film is empty.
     void extend(Accumulation& accumulation, std::uint32_t end, const RunControl& control = {});
     /// Means, variances and statistics of what the film holds now.
     RenderResult result(const Accumulation& accumulation) const;

@@ -88,6 +88,18 @@ std::string stats_to_json(const RenderStats& stats) {
     put_member(out, "time_limited", stats.time_limited);
     put_member(out, "samples_min", stats.samples_min);
     put_member(out, "samples_max", stats.samples_max);
+    put_member(out, "samples_mean", stats.samples_mean);
+    if (stats.noise) {
+        out.Key("noise");
+        out.StartObject();
+        put_member(out, "threshold", stats.noise->threshold);
+        put_member(out, "tiles", stats.noise->tiles);
+        put_member(out, "tiles_above", stats.noise->above);
+        put_member(out, "tiles_capped", stats.noise->capped);
+        put_member(out, "worst", stats.noise->worst);
+        put_member(out, "pilot_paths", stats.noise->pilot_paths);
+        out.EndObject();
+    }
     put_member(out, "notes", stats.notes);
     put_member(out, "warnings", stats.warnings);
     out.Key("explain");

@@ -29,9 +29,11 @@ struct Ledger {
         for (std::uint32_t unit = batch.begin; unit < batch.end; ++unit) ++done[{batch.item, unit}];
     }
     bool complete_once(const DispatchOptions& options) const {
-        if (done.size() != std::size_t(options.items) * (options.end - options.begin)) return false;
+        std::size_t all = 0;
+        for (std::uint32_t item = 0; item < options.items; ++item) all += options.end_of(item) - options.begin;
+        if (done.size() != all) return false;
         for (const auto& [key, count] : done)
-            if (count != 1 || key.first >= options.items || key.second < options.begin || key.second >= options.end) return false;
+            if (count != 1 || key.first >= options.items || key.second < options.begin || key.second >= options.end_of(key.first)) return false;
         return true;
     }
 };

@@ -243,7 +243,8 @@ TEST_CASE("Film.SumsAreExactAndCountersAddUp", "[quick]") {
     w[2 * FILM_WORDS + FILM_ALPHA] = 1;
     w[FILM_WORDS + FILM_NONFINITE] = 3;
     w[3 * FILM_WORDS + FILM_VIOLATIONS] = 2;
-    film.add(0, 2, 2, 2, w);
+    const std::uint32_t both[] = {0, 1};
+    film.add(both, 2, 2, w);
     const FilmSums::Pixel p = film.pixel(0);
     CHECK(p.mean[0] == 1);  // 1 unit of radiance / 2 samples / scale 0.5
     CHECK(p.mean[1] == 0);

@@ -137,6 +137,44 @@ TEST_CASE("Dispatcher.ItemsAdvanceTogether", "[quick]") {
     CHECK(*most - *least <= 60);
 }
 
+TEST_CASE("Dispatcher.EveryItemToItsOwnEnd", "[quick]") {
+    for (int workers = 1; workers <= 3; ++workers)
+        for (const std::uint32_t chunk : {0u, 1u, 7u, 1000000u})
+            for (const std::vector<std::uint32_t>& ends : {std::vector<std::uint32_t>{5, 9, 4, 100, 5}, {4, 4}, {}, {4294967295u}, {7, 2, 7}}) {
+                DispatchOptions options = grid(static_cast<std::uint32_t>(ends.size()), ends.size() == 1 ? 4294967200u : 4, 0);
+                options.ends = ends;
+                options.fixed_chunk = chunk;
+                Ledger ledger;
+                const DispatchReport report = dispatch(stubs(ledger, workers), options);
+                CAPTURE(workers, chunk, ends);
+                CHECK(ledger.complete_once(options));
+                CHECK(report.units_done == report.units_total);
+                CHECK_FALSE(report.failed);
+                for (std::size_t i = 0; i < ends.size(); ++i) CHECK(report.units_of_item[i] == std::max(ends[i], options.begin) - options.begin);
+            }
+}
+
+TEST_CASE("Dispatcher.ItemsOfUnlikeLengthAdvanceByShares", "[quick]") {
+    Ledger ledger;
+    DispatchOptions options = grid(20, 0, 0);
+    for (std::uint32_t item = 0; item < options.items; ++item) options.ends.push_back(100 * (1 + item));
+    options.target_seconds = 0.001;
+    std::uint32_t units = 0;
+    options.stop = [&] { return units > 10000; };  // of 21,000
+    const DispatchReport report = dispatch(stubs(ledger, 1,
+                                                 [&](const Batch& b) {
+                                                     units += b.end - b.begin;
+                                                     pause(2e-5 * (b.end - b.begin));
+                                                 }),
+                                           options);
+    CHECK(report.stopped);
+    for (std::uint32_t item = 0; item < options.items; ++item) {
+        CAPTURE(item, report.units_of_item[item]);
+        // A pass moves all by a twentieth at most here.
+        CHECK(std::abs(report.units_of_item[item] / double(options.ends[item]) - 0.48) < 0.15);
+    }
+}
+
 TEST_CASE("Dispatcher.StopAtOnceDoesNothing", "[quick]") {
     Ledger ledger;
     DispatchOptions options = grid(4, 0, 10);
