@@ -3,6 +3,7 @@
 // (coherent), from outside (incoherent) and from inside. An item is a ray. What it takes is counted by a program of its own.
 #include <fmt/format.h>
 
+#include <functional>
 #include <map>
 #include <memory>
 
@@ -20,16 +21,23 @@ namespace {
 /// A scene as a method sees it.
 struct View {
     std::string scene, strategy, estimator, accelerator;
-    std::string key() const { return scene + ' ' + strategy + ' ' + estimator + ' ' + accelerator; }
+    bool shadow_rays;  ///< the estimator is what is measured
+    std::string key() const { return scene + ' ' + strategy + ' ' + estimator + ' ' + accelerator + (shadow_rays ? " lit" : ""); }
 };
 
-/// The view, its probe at one width, and rays. Only the last one asked for is kept.
+/// Rays of one set, and what one takes.
+struct Rays {
+    std::vector<ProbeRay> list;
+    Cost cost;
+};
+
+/// The view, its probe at one width, and rays of the items measured so far. Only the last one asked for is kept.
 struct Field {
     DeviceScene device;
     std::unique_ptr<Probe> probe;
-    std::map<std::string, std::vector<ProbeRay>> rays;
-    std::map<std::string, Cost> costs;
+    std::map<std::string, Rays> rays;
     std::string family;
+    Film film;
     int width = 0;
 };
 
@@ -41,8 +49,11 @@ Field& field(Session& session, const View& view, int width) {
         Scene scene = bench_scene(view.scene);
         scene.render.strategy = view.strategy;
         scene.render.transmittance = view.estimator;
+        // Where no light is sampled, nothing is built for an estimator.
+        if (view.shadow_rays) scene.lights.push_back(cases::light(LightKind::directional));
         for (const cases::FamilyCase& c : cases::families)
             if (c.kernel == scene.media[0].kernel) f.family = c.name;
+        f.film = scene.film;
         RenderOptions options = session.render_options();
         options.accelerator = view.accelerator;
         f.device = make_device_scene(scene, options);
@@ -50,15 +61,10 @@ Field& field(Session& session, const View& view, int width) {
         probe_key.clear();
     }
     if (const std::string key = view.key() + ' ' + std::to_string(width); key != probe_key) {
-        const Film film = bench_scene(view.scene).film;
         f.probe.reset();
-        f.costs.clear();
+        f.rays.clear();
         f.width = width;
         f.probe = std::make_unique<Probe>(session.device(), f.device, width);
-        // One primitive at a time is slow: fewer rays do.
-        f.rays["coherent"] = camera_rays(*f.probe, film.width, film.height, (width == 1 ? 4 : 2) * (session.options().quick ? 4 : 1), 0);
-        f.rays["inside"] = inside_rays(f.device, f.rays["coherent"].size(), 1);
-        f.rays["incoherent"] = crossing_rays(f.device, f.rays["coherent"].size(), 2);
         probe_key = key;
     }
     return f;
@@ -66,11 +72,17 @@ Field& field(Session& session, const View& view, int width) {
 
 double byte_size(const auto& vector) { return static_cast<double>(vector.size() * sizeof(vector[0])); }
 
+/// Every n-th of them, so that about `count` are left: all parts of an image take part.
+std::vector<ProbeRay> spread(const std::vector<ProbeRay>& rays, std::size_t count) {
+    std::vector<ProbeRay> some;
+    for (std::size_t i = 0; i < rays.size(); i += std::max<std::size_t>(1, rays.size() / count)) some.push_back(rays[i]);
+    return some;
+}
+
 /// What a ray takes on average, `what` as in count_ray: operations counted by the engine (WORK_*) and evaluations of vectors, by
-/// the first thousand rays. What is not among these (sorting chords, picking a primitive) is left out.
-Cost count(Session& session, Field& f, const std::string& from, cl_uint what) {
-    const auto& all = f.rays.at(from);
-    const std::vector<ProbeRay> rays(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(all.size(), 1024)));
+/// about a thousand rays. What is not among these (sorting chords, picking a primitive) is left out.
+Cost count(Session& session, const Field& f, const std::vector<ProbeRay>& all, cl_uint what) {
+    const std::vector<ProbeRay> rays = spread(all, 1024);
     ProgramOptions options = defines_of(f.device, f.width);
     std::erase_if(options.defines, [](const auto& define) { return define.first == "CLUME_COUNT"; });
     options.define("CLUME_COUNT", 1);
@@ -109,6 +121,20 @@ Cost count(Session& session, Field& f, const std::string& from, cl_uint what) {
     return cost;
 }
 
+/// Rays of the set, as many as a launch can do in a quarter of a second, but no more than 2^14 or so. `run` gives seconds.
+Rays make_rays(Session& session, Field& f, const std::string& from, cl_uint what, const std::function<double(const std::vector<ProbeRay>&)>& run) {
+    const auto make = [&](int stride) {
+        std::vector<ProbeRay> list = camera_rays(*f.probe, f.film.width, f.film.height, stride, 0);
+        return from == "coherent" ? list : from == "inside" ? inside_rays(f.device, list.size(), 1) : crossing_rays(f.device, list.size(), 2);
+    };
+    int stride = 2;
+    std::vector<ProbeRay> list = make(stride);
+    const std::vector<ProbeRay> some = spread(list, 64);
+    const double s = run(some) / static_cast<double>(some.size()), most_s = session.options().quick ? 0.05 : 0.25;
+    while (s * static_cast<double>(list.size()) > most_s && list.size() > 256) list = make(++stride);
+    return {list, count(session, f, list, what)};
+}
+
 /// "name", or "name_bvh" where the accelerator is a choice.
 struct Choice {
     std::string name;
@@ -125,7 +151,7 @@ std::vector<Choice> choices(const std::string& scene, bool flights) {
         const bool has_width = !m.null_collisions && (flights || m.program != TRANSMITTANCE_BINARY);
         for (const char* accelerator : either ? std::vector<const char*>{"cells", "bvh"} : std::vector<const char*>{"auto"})
             all.push_back({either ? fmt::format("{}_{}", m.name, accelerator) : m.name,
-                           {scene, flights ? m.name : either ? "decomposition" : "delta", flights ? "analytic" : m.name, accelerator}, has_width});
+                           {scene, flights ? m.name : either ? "decomposition" : "delta", flights ? "analytic" : m.name, accelerator, !flights}, has_width});
     }
     return all;
 }
@@ -142,11 +168,10 @@ void add_ray_benchmarks(Session& session) {
                         const std::string name = fmt::format("{}/{}/{}/{}", flights ? "flight" : "transmittance", scene, c.name, from);
                         add_kernel_benchmark(session, c.has_width ? with_width(name, width) : name, [=, &session](std::uint32_t number) {
                             Field& f = field(session, c.view, width);
-                            const auto& rays = f.rays.at(from);
-                            const double s = flights ? f.probe->flights(rays, number).device_s : f.probe->estimated_transmittances(rays, number).device_s;
-                            auto cost = f.costs.find(name);
-                            if (cost == f.costs.end()) cost = f.costs.emplace(name, count(session, f, from, flights ? 1 : 8)).first;
-                            return Launch{static_cast<double>(rays.size()), s, cost->second};
+                            const auto run = [&](const std::vector<ProbeRay>& rays) { return flights ? f.probe->flights(rays, number).device_s : f.probe->estimated_transmittances(rays, number).device_s; };
+                            auto rays = f.rays.find(name);
+                            if (rays == f.rays.end()) rays = f.rays.emplace(name, make_rays(session, f, from, flights ? 1 : 8, run)).first;
+                            return Launch{static_cast<double>(rays->second.list.size()), run(rays->second.list), rays->second.cost};
                         });
                     }
                 }
