@@ -19,18 +19,27 @@ __kernel void peak_fma(__global float* out, uint count, uint rounds, float a, fl
     out[i] = lanes_sum(((x0 + x1) + (x2 + x3)) + ((x4 + x5) + (x6 + x7)) + (((x8 + x9) + (xa + xb)) + ((xc + xd) + (xe + xf))));
 }
 
-/// Reads 8 · rounds vectors, wrapping around at `mask` + 1 of them (a power of two); `first`: work-items of the launches before. CPUs
-/// read a stretch per work-item, GPUs (`apart`, the number of work-items) neighbours by neighbours.
-__kernel void peak_read(__global const vfloat* data, __global float* out, uint count, uint mask, uint rounds, uint apart, uint first) {
+#ifndef PEAK_INTERLEAVED  // 1: neighbours read neighbours, as GPUs like it; 0: a work-item reads a stretch of its own
+#define PEAK_INTERLEAVED 0
+#endif
+
+/// Reads 8 · rounds vectors, wrapping around at `mask` + 1 of them (a power of two, 8 at least); `first`: work-items of the launches before.
+__kernel void peak_read(__global const vfloat* data, __global float* out, uint count, uint mask, uint rounds, uint first) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
-    const uint step = apart ? apart : 1u;
-    uint at = apart ? i + first * 8u * rounds : (i + first) * 8u * rounds;
     vfloat s0 = (vfloat)0.0f, s1 = s0, s2 = s0, s3 = s0, s4 = s0, s5 = s0, s6 = s0, s7 = s0;
-    for (uint round = 0; round < rounds; ++round) {
-        s0 += data[at & mask], s1 += data[(at + step) & mask], s2 += data[(at + 2u * step) & mask], s3 += data[(at + 3u * step) & mask];
-        s4 += data[(at + 4u * step) & mask], s5 += data[(at + 5u * step) & mask], s6 += data[(at + 6u * step) & mask], s7 += data[(at + 7u * step) & mask];
-        at += 8u * step;
+#if PEAK_INTERLEAVED
+    const uint step = count;
+    uint at = i + first * 8u * rounds;
+#define AT(k) data[(at + k * step) & mask]
+#else
+    const uint step = 1;
+    uint at = (i + first) * 8u * rounds;
+#define AT(k) data[(at & mask) + k]
+#endif
+    for (uint round = 0; round < rounds; ++round, at += 8u * step) {
+        s0 += AT(0u), s1 += AT(1u), s2 += AT(2u), s3 += AT(3u);
+        s4 += AT(4u), s5 += AT(5u), s6 += AT(6u), s7 += AT(7u);
     }
     out[i] = lanes_sum(((s0 + s1) + (s2 + s3)) + ((s4 + s5) + (s6 + s7)));
 }

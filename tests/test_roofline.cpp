@@ -227,9 +227,10 @@ TEST_CASE("Roofline.WritesSharesOfWhatTheDeviceCanDo") {
     // One of each kind, at the width that the device likes.
     const std::string filter = "^peaks/|/(intersect/whitened|density/gaussian|depth/epanechnikov|inverse/uniform|leaf/depth|segments|flight/close/decomposition_bvh/inside|transmittance/close/analytic_cells/coherent|math/exp/own)/w" +
                                width + "$|/(math/asin/(own|built_in)|flight/close/delta/incoherent|random/philox|phase/sample/rayleigh|light/sphere|environment/envmap|film/sample|sort/bitonic/64|sort/insertion/8|node|walk/close/bvh/inside|transfer/to_device)$";
-    const Run run({"bench", "--roofline", "--quick", "--filter", filter, "--json", "speed.json"}, folder.path);
+    Process run({"bench", "--roofline", "--quick", "--filter", filter, "--json", "speed.json"}, folder.path);
+    const int code = run.wait(900);  // a dozen programs to compile
     INFO(run.out << run.err);
-    REQUIRE(run.code == 0);
+    REQUIRE(code == 0);
     std::ifstream file(folder.path / "speed.json");
     std::stringstream text;
     text << file.rdbuf();
