@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <functional>
 
 #include "bench/kernels.h"
@@ -106,9 +107,18 @@ double launch_latency(Session& session) {
 
 double Peaks::operations_s() const { return *std::max_element(fma_s.begin(), fma_s.end()); }
 
-const PeakLevel& Peaks::level(double footprint) const {
-    for (const PeakLevel& l : levels)
-        if (footprint <= static_cast<double>(l.byte_size)) return l;
+PeakLevel Peaks::level(double footprint) const {
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+        const auto upper = static_cast<double>(levels[k].byte_size);
+        if (footprint > upper) continue;
+        PeakLevel here = levels[k];
+        if (k == 0) return here;
+        const PeakLevel& below = levels[k - 1];
+        const double x = std::log(upper / footprint) / std::log(upper / static_cast<double>(below.byte_size));
+        here.bytes_s *= std::pow(below.bytes_s / here.bytes_s, x);
+        here.gathers_s *= std::pow(below.gathers_s / here.gathers_s, x);
+        return here;
+    }
     return levels.back();
 }
 
@@ -124,7 +134,7 @@ const Peaks& peaks(Session& session) {
 }
 
 std::optional<Share> share_of(const Cost& cost, double items_s, const Peaks& peaks) {
-    const PeakLevel& level = peaks.level(cost.footprint);
+    const PeakLevel level = peaks.level(cost.footprint);
     const std::pair<double, std::string> shares[] = {{cost.operations * items_s / peaks.operations_s(), "operations"},
                                                      {cost.bytes * items_s / level.bytes_s, fmt::format("bytes in {}", level.name)},
                                                      {cost.gathers * items_s / level.gathers_s, fmt::format("gathers in {}", level.name)}};

@@ -31,7 +31,8 @@ struct Peaks {
     std::vector<PeakLevel> levels;  ///< ascending
     double launch_s = 0;            ///< of nothing: from the call until its end is known
     double operations_s() const;    ///< the most of fma_s
-    const PeakLevel& level(double footprint) const;
+    /// Between the sizes measured, a power of the footprint; the name is that of the larger one.
+    PeakLevel level(double footprint) const;
 };
 
 /// Measured when first asked for.
