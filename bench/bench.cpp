@@ -109,6 +109,7 @@ int run_bench(int argc, char** argv) {
         bench_kernels_section(session);
         bench_specialisation_section(session);
         bench_scaling_section(session);
+        bench_devices_section(session);
         bench_work_section(session);
     }
     if (!session.any()) throw UsageError("bench: --filter " + options->filter + ": is found in no item's name; see clume bench --list");

@@ -66,7 +66,7 @@ void bench_scaling_section(Session& session) {
                     "wall clock; cpu: processor seconds of the whole preparation.\n" +
                         fmt::format("{:12} {:>10} {:>9} {:>9} {:>9} {:>9} {:>10}", "", "primitives", "build s", "cpu s", "MB", "bytes/pr.", "us/path"));
     std::vector<Point> points;
-    for (const auto& [name, count] : {std::pair{"count_1k", 1000u}, {"count_10k", 10000u}, {"count_100k", 100000u}, {"count_1M", 1000000u}})
+    for (const auto& [name, count] : {std::pair{"count_1k", 1000u}, {"count_10k", 10000u}, {"count_100k", 100000u}, {"count_1M", 1000000u}, {"count_10M", 10000000u}})
         if (session.wants(name)) points.push_back(measure(session, name, reference::ball_scene_n(count)));
     if (points.size() > 1) {
         const Point &a = points.front(), &b = points.back();

@@ -15,6 +15,7 @@ void bench_kernels_section(Session& session);  ///< kernels.cpp
 void write_roofline(Session& session, const std::filesystem::path& docs);
 void bench_specialisation_section(Session& session);
 void bench_scaling_section(Session& session);
+void bench_devices_section(Session& session);
 void bench_work_section(Session& session);     ///< work_fit.cpp
 /// study.cpp; only with Options::study.
 void bench_study_section(Session& session);

@@ -99,6 +99,21 @@
 #define CLUME_PER_PRIMITIVE (!CLUME_UNIFORM_G || !CLUME_UNIFORM_ALBEDO || CLUME_EMISSION == 2 || \
                              (!CLUME_ONE_MEDIUM && CLUME_PHASES != PHASE_ISOTROPIC))
 
+// 1: a work-item follows CLUME_WIDTH paths side by side, instead of one beside which it looks at CLUME_WIDTH primitives.
+#ifndef CLUME_LANES
+#define CLUME_LANES 0
+#endif
+#if CLUME_WIDTH == 1
+#undef CLUME_LANES
+#define CLUME_LANES 0
+#endif
+#ifndef CLUME_LANES_ENOUGH  // sixteenths of the flights under way that are left when those that ended are looked after
+#define CLUME_LANES_ENOUGH 10
+#endif
+#ifndef CLUME_LANES_STEPPING  // sixteenths of the flights under way that may be between cells while the others collide
+#define CLUME_LANES_STEPPING 7
+#endif
+
 #define CONCAT_(a, b) a##b
 #define CONCAT(a, b) CONCAT_(a, b)
 
@@ -106,21 +121,41 @@
 typedef float vfloat;
 typedef int vint;
 typedef uint vuint;
+typedef ulong vulong;
 #define vselect(a, b, mask) ((mask) ? (b) : (a))
 #define vany(mask) (mask)
 #define as_vint(x) as_int(x)
 #define as_vuint(x) as_uint(x)
 #define as_vfloat(x) as_float(x)
+#define to_vfloat(x) ((float)(x))
+#define to_vint(x) ((int)(x))
+#define to_vuint(x) ((uint)(x))
+#define to_vulong(x) ((ulong)(x))
 #define vload_row(p) (*(p))
 #else
 typedef CONCAT(float, CLUME_WIDTH) vfloat;
 typedef CONCAT(int, CLUME_WIDTH) vint;
 typedef CONCAT(uint, CLUME_WIDTH) vuint;
+typedef CONCAT(ulong, CLUME_WIDTH) vulong;
+#if CLUME_WIDTH == 16
+#define CLUME_HALF_WIDTH 8
+#elif CLUME_WIDTH == 8
+#define CLUME_HALF_WIDTH 4
+#else
+#define CLUME_HALF_WIDTH 2
+#endif
+typedef CONCAT(ulong, CLUME_HALF_WIDTH) vpairs;  // the bits of a vuint, two lanes each (even lanes: low words)
+#define as_vpairs(x) CONCAT(as_ulong, CLUME_HALF_WIDTH)(x)
+#define pairs_as_vuint(x) CONCAT(as_uint, CLUME_WIDTH)(x)
 #define vselect(a, b, mask) select((a), (b), (mask))
 #define vany(mask) any(mask)
 #define as_vint(x) CONCAT(as_int, CLUME_WIDTH)(x)
 #define as_vuint(x) CONCAT(as_uint, CLUME_WIDTH)(x)
 #define as_vfloat(x) CONCAT(as_float, CLUME_WIDTH)(x)
+#define to_vfloat(x) CONCAT(convert_float, CLUME_WIDTH)(x)
+#define to_vint(x) CONCAT(convert_int, CLUME_WIDTH)(x)
+#define to_vuint(x) CONCAT(convert_uint, CLUME_WIDTH)(x)
+#define to_vulong(x) CONCAT(convert_ulong, CLUME_WIDTH)(x)
 #define vload_row(p) (*(__global const vfloat*)(p))
 #endif
 

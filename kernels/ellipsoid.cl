@@ -95,8 +95,9 @@ static vfloat erf_between(vfloat x0, vfloat x1, vfloat delta) {
 }
 
 /// Optical depth of each primitive between t0 and t1 (t0 <= t1, inside its chord): error < 3e-6 relative against lines within the
-/// intersection's limit, 0 below 2^-100. Split at any t, additivity error < 1e-5 relative; as t1 grows, monotonicity error < 3e-6 relative.
+/// intersection's limit, 0 below 2^-100 (of sigma / w where that is above 1). Split at any t, additivity error < 1e-5 relative; as t1 grows, monotonicity error < 3e-6 relative.
 /// On a chord whose half is less than 2^-5 of its distance, an interval's ends count as known to an ulp, and a uniform chord's own.
+/// Of the line that c's t_perp, w and d2 give, geometry error < 2e-6 relative, t being known to 2 ulp of |t_perp| + (h + 1) / w.
 static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uint family, vfloat e2) {
     vfloat depth = sigma * (t1 - t0);  // uniform
 #if CLUME_FAMILIES & (FAMILY_GAUSSIAN | FAMILY_EPANECHNIKOV)
@@ -128,6 +129,7 @@ static vfloat depth_part(const Chord* c, vfloat sigma, vfloat t0, vfloat t1, uin
 /// depth to the exit is less: error < 6e-6 relative of tau, t and the line being off by no more than the intersection's limit;
 /// tau >= 2^-34, as `exponential` gives it.
 /// Clamped to [t0, t_out], so that rounding loses no collision.
+/// On the line that c's t_perp, w and d2 give, geometry error < 1e-6 relative of tau, t being known to 3 ulp of |t_perp| + (h + 1) / w.
 static vfloat flight_part(const Chord* c, vfloat sigma, vfloat t0, vfloat tau, uint family, vfloat e2) {
     vfloat t = t0;
     vint collides = sigma > (vfloat)0.0f;

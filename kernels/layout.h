@@ -22,8 +22,8 @@
 //   grid_cells CellEntry             per grid: its table of bricks (roots, then blocks of 8 children), its bounds' own table
 //   grid_values float[729]           per brick: 9 × 9 × 9 samples, x fastest
 //   pixels   uint                    film index (x + width * y) of each pixel that the batch renders
-//   states   PathState               per work-item, kept between launches
-//   sums     ulong[FILM_WORDS]       per work-item, 128-bit fixed point (film.cl)
+//   states   PathState               per row of sums, kept between launches
+//   sums     ulong[FILM_WORDS]       per row: a share of one pixel's samples, 128-bit fixed point (film.cl)
 #ifndef CLUME_LAYOUT_H
 #define CLUME_LAYOUT_H
 
@@ -215,11 +215,12 @@ typedef struct PathState {
     float4 beta;
     float4 radiance;
     uint sample, depth, draw, flags;  // sample: the next one if no path is alive
+    uint row, next, pad0, pad1;       // of lanes: which row the path counts for; the next sample of this one
 } PathState;
 
 #ifdef __cplusplus
 static_assert(sizeof(RenderParams) == 240 && sizeof(CellEntry) == 16 && sizeof(CellLeaf) == 16 && sizeof(Reference) == 16 && sizeof(Primitive) == 64 && sizeof(BvhNode) == 224 && sizeof(MediumInfo) == 16);
-static_assert(sizeof(LightInfo) == 144 && sizeof(AliasEntry) == 16 && sizeof(GridInfo) == 176 && sizeof(PathState) == 80);
+static_assert(sizeof(LightInfo) == 144 && sizeof(AliasEntry) == 16 && sizeof(GridInfo) == 176 && sizeof(PathState) == 96);
 }  // namespace clume::device
 #endif
 

@@ -78,15 +78,46 @@ static float surface_pdf(uint i, float3 o, float3 d, float t, __global const Lig
     return divide_s(select_pdf * CLUME_INV_2PI, max_s(sphere_cap(lights[i].position.w, dot_s(oc, oc)), 0x1p-90f));
 }
 
-/// Texel of environment i that direction d (unit) points into: lon = atan2(x, z), lat = asin(y), after undoing rotate_y.
+/// Texel of environment i that direction d (unit) points into, after undoing rotate_y: columns by the longitude atan2(x, z), rows by
+/// the angle from the nearer pole, which x and z still know where y is 1. d lies in the texel, or outside it by error < 5e-7
+/// absolute (rad).
 static uint envmap_texel(uint i, float3 d, __global const LightInfo* lights) {
     const float s = lights[i].axis.x, c = lights[i].axis.y;
     const float x = fma(c, d.x, -(s * d.z)), z = fma(s, d.x, c * d.z);
-    const float width = (float)lights[i].width, height = (float)lights[i].height;
-    const float column = clamp_s(floor(width * fma(-CLUME_INV_2PI, atan2_s(x, z), 0.5f)), 0.0f, width - 1.0f);
-    const float row = clamp_s(floor(height * fma(-2.0f * CLUME_INV_2PI, asin_s(clamp_s(d.y, -1.0f, 1.0f)), 0.5f)), 0.0f, height - 1.0f);
-    return lights[i].texel_offset + (uint)row * lights[i].width + (uint)column;
+    const uint width = lights[i].width, height = lights[i].height;
+    const float column = clamp_s(floor(fma((float)width * -CLUME_INV_2PI, atan2_s(x, z), 0.5f * (float)width)), 0.0f, (float)(width - 1));
+    const uint k = min((uint)((float)height * (2.0f * CLUME_INV_2PI * atan2_s(sqrt_s(fma(x, x, z * z)), fabs(d.y)))), (height - 1) / 2);
+    return lights[i].texel_offset + (d.y < 0.0f ? height - 1 - k : k) * width + (uint)column;
 }
+
+#if CLUME_NEE & LIGHT_ENVMAP
+/// A texel of environment i by its alias table, share error < 3e-9 relative (to the mean texel's share if that is greater), and a
+/// direction in it, uniform by solid angle: direction error < 2.2e-6 absolute. envmap_texel finds the same texel: of the directions
+/// next to an edge, those that rounding could carry across are moved away from it.
+static float3 envmap_sample(uint i, uint4 bits, uint4 more, uint* texel, __global const LightInfo* lights, __global const AliasEntry* alias) {
+    const uint width = lights[i].width, height = lights[i].height, count = width * height, offset = lights[i].texel_offset;
+    // floor(x count / 2^64) for 64 bits x: with 32, texels of large images are not alike.
+    uint t = (uint)(((ulong)bits.y * count + (((ulong)bits.w * count) >> 32)) >> 32);
+    if (bits.z >= alias[offset + t].threshold) t = alias[offset + t].other;
+    *texel = offset + t;
+    const uint row = t / width, column = t - row * width;
+    // Longitude is linear in the column; half a turn is its right edge, counted from the image's middle.
+    const float edge_u = min_s(2.5e-7f * (float)width, 0.5f), u = clamp_s(uniform_s(more.x), edge_u, 1.0f - edge_u);
+    const float turn = divide_s(fma(-2.0f, u, (float)((int)width - 2 * (int)column)), 2.0f * (float)width);
+    // The versine of the angle from the nearer pole is uniform between those of the row's edges.
+    const float v = uniform_s(more.y);
+    const bool below = 2 * row + (v < 0.5f ? 1u : 2u) > height;
+    const uint k = below ? height - 1 - row : row;
+    float cosine_lat, z_lon;
+    const float quarter = divide_s(0.25f, (float)height), near_half = sincos_turns_s((float)k * quarter, &cosine_lat), far_half = sincos_turns_s((float)(k + 1) * quarter, &cosine_lat);
+    const float near = 2.0f * near_half * near_half, far = 2.0f * far_half * far_half, edge_v = min_s(2.5e-7f * (float)height, 0.5f);
+    const float versine = fma(clamp_s(below ? 1.0f - v : v, k == 0 ? 0.0f : edge_v, 1.0f - edge_v), far - near, near);
+    const float y = 1.0f - versine, r = sqrt_s(versine * (2.0f - versine));
+    const float x_lon = sincos_turns_s(fabs(turn), &z_lon);
+    const float x = r * copysign(x_lon, turn), z = r * z_lon, sine = lights[i].axis.x, cosine = lights[i].axis.y;
+    return normalize_s((float3)(fma(cosine, x, sine * z), below ? -y : y, fma(cosine, z, -(sine * x))));
+}
+#endif
 
 /// Radiance that a ray escaping along d finds, each environment weighted against next-event estimation (phase_pdf of the
 /// scattering that made d; `camera`: the ray comes from the camera, only what is visible counts, unweighted).
@@ -177,22 +208,10 @@ static bool light_sample(float3 o, uint4 bits, uint4 more, LightSample* s, __con
 #endif
 #if CLUME_NEE & LIGHT_ENVMAP
     if (kind == LIGHT_ENVMAP) {
-        const uint count = lights[i].width * lights[i].height, offset = lights[i].texel_offset;
-        uint texel = uniform_index(bits.y, count);
-        if (bits.z >= alias[offset + texel].threshold) texel = alias[offset + texel].other;
-        const uint row = texel / lights[i].width, column = texel - row * lights[i].width;
-        // Uniform in the texel: lon is linear in the column; sin(lat) is uniform between the sines of the row's edges.
-        const float turn = 0.5f - divide_s((float)column + uniform_s(more.x), (float)lights[i].width);
-        const float inverse_height = rcp_s((float)lights[i].height);
-        const float top = sincos_turns_s(fabs(0.25f - 0.5f * (float)row * inverse_height)).x;
-        const float bottom = sincos_turns_s(fabs(0.25f - 0.5f * (float)(row + 1) * inverse_height)).x;
-        const float y_top = 2 * row > lights[i].height ? -top : top, y_bottom = 2 * (row + 1) > lights[i].height ? -bottom : bottom;
-        const float y = fma(uniform_s(more.y), y_bottom - y_top, y_top), r = sqrt_s(max_s(fma(-y, y, 1.0f), 0.0f));
-        const float2 lon = sincos_turns_s(turn < 0.0f ? turn + 1.0f : turn);
-        const float x = r * lon.x, z = r * lon.y, sine = lights[i].axis.x, cosine = lights[i].axis.y;
-        s->direction = normalize_s((float3)(fma(cosine, x, sine * z), y, fma(cosine, z, -(sine * x))));
-        s->pdf = select_pdf * alias[offset + texel].pdf_texel;
-        s->value = to_spectrum(texels[offset + texel]) * rcp_s(s->pdf);
+        uint texel;
+        s->direction = envmap_sample(i, bits, more, &texel, lights, alias);
+        s->pdf = select_pdf * alias[texel].pdf_texel;
+        s->value = to_spectrum(texels[texel]) * rcp_s(s->pdf);
         return true;
     }
 #endif

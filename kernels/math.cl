@@ -3,49 +3,13 @@
 // bits: names end in _s for one float and in _v for a vector of CLUME_WIDTH. See math_body.inc.cl for domains and errors.
 #include "config.cl"
 
-#define FN(name) name##_s
-#define VF float
-#define VI int
-#define VU uint
-#define SEL(a, b, mask) ((mask) ? (b) : (a))
-#define ANY(mask) (mask)
-#define AS_F(x) as_float(x)
-#define AS_I(x) as_int(x)
-#define AS_U(x) as_uint(x)
+#include "scalar.inc.cl"
 #include "math_body.inc.cl"
-#undef FN
-#undef VF
-#undef VI
-#undef VU
-#undef SEL
-#undef ANY
-#undef AS_F
-#undef AS_I
-#undef AS_U
-
-#define FN(name) name##_v
-#define VF vfloat
-#define VI vint
-#define VU vuint
-#define SEL(a, b, mask) vselect(a, b, mask)
-#define ANY(mask) vany(mask)
-#define AS_F(x) as_vfloat(x)
-#define AS_I(x) as_vint(x)
-#define AS_U(x) as_vuint(x)
+#include "body_end.inc.cl"
+#include "vector.inc.cl"
 #include "math_body.inc.cl"
-#undef FN
-#undef VF
-#undef VI
-#undef VU
-#undef SEL
-#undef ANY
-#undef AS_F
-#undef AS_I
-#undef AS_U
+#include "body_end.inc.cl"
 
-/// Smaller and larger of two numbers that are not NaN.
-static float min_s(float a, float b) { return a < b ? a : b; }
-static float max_s(float a, float b) { return a > b ? a : b; }
 static float clamp_s(float x, float lo, float hi) { return min_s(max_s(x, lo), hi); }
 static float dot_s(float3 a, float3 b) { return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)); }
 static float3 cross_s(float3 a, float3 b) {
@@ -58,20 +22,6 @@ static float3 along_s(float3 o, float3 d, float t) {
 static float3 normalize_s(float3 v) {
     const float s = rsqrt_s(dot_s(v, v));
     return v * s;
-}
-
-/// sin and cos of 2π x, x in [0, 1]: quarter turns by rint, then Taylor-like minimax on ±1/8 turn; error < 1.5e-7 absolute.
-static float2 sincos_turns_s(float x) {
-    const float y = 4.0f * x;
-    const float k = rint(y);
-    const float r = y - k;  // exact, in [-1/2, 1/2], quarter turns
-    const float r2 = r * r;
-    const float s = r * fma(r2, fma(r2, fma(r2, fma(r2, 1.581950817e-4f, -4.681260631e-3f), 7.969258184e-2f), -6.459640961e-1f), 1.570796327f);
-    const float c = fma(r2, fma(r2, fma(r2, fma(r2, 9.033629753e-4f, -2.085993603e-2f), 2.536691826e-1f), -1.233700540f), 1.0f);
-    const int q = (int)k & 3;
-    const float sn = (q & 1) ? c : s;
-    const float cn = (q & 1) ? s : c;
-    return (float2)((q & 2) ? -sn : sn, (q == 1 || q == 2) ? -cn : cn);
 }
 
 /// asin(x) for |x| <= 1, error < 3e-7 relative.

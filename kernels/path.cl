@@ -55,26 +55,59 @@ static void collision_properties(uint primitive, spectrum* albedo, spectrum* emi
 #endif
 }
 
-/// What a light adds at x for a path that came along d, before beta.
-static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws* r, Flight* flight, SCENE_ARGS) {
 #if CLUME_NEE
-    LightSample s;
+/// A light that x sees past all surfaces: *value is what it adds there for a path that came along d, before beta and transmittance;
+/// *bits a word for the latter. False if none is.
+static bool path_light_sample(float3 x, float3 d, uint phase, float g, const Draws* r, LightSample* s, spectrum* value, uint* word, SCENE_ARGS) {
 #if CLUME_NEE & LIGHT_ENVMAP
     const uint4 more = draw_bits(r, DRAW_LIGHT_MORE);
 #else
     const uint4 more = (uint4)0u;
 #endif
     const uint4 bits = draw_bits(r, DRAW_LIGHT);
-    if (!light_sample(x, bits, more, &s, params, lights, texels, alias)) return (spectrum)0.0f;
+    if (!light_sample(x, bits, more, s, params, lights, texels, alias)) return false;
     uint blocker;
-    surfaces_nearest(x, s.direction, s.distance, s.light, &blocker, params, lights);
-    if (blocker != NO_LIGHT) return (spectrum)0.0f;
-    const float value = phase_value(phase, g, phase_versine(g, d, s.direction));
-    const float weight = (lights[s.light].kind & CLUME_HITS) ? divide_s(s.pdf, s.pdf + value) : 1.0f;
-    return s.value * (value * weight * transmittance_estimate(x, s.direction, s.distance, bits.w, r, flight, SCENE));
+    surfaces_nearest(x, s->direction, s->distance, s->light, &blocker, params, lights);
+    if (blocker != NO_LIGHT) return false;
+    const float scattered = phase_value_s(phase, g, phase_versine(g, d, s->direction));
+    const float weight = (lights[s->light].kind & CLUME_HITS) ? divide_s(s->pdf, s->pdf + scattered) : 1.0f;
+    *value = s->value * (scattered * weight);
+    *word = bits.w;
+    return true;
+}
+#endif
+
+/// What a light adds at x for a path that came along d, before beta.
+static spectrum path_light(float3 x, float3 d, uint phase, float g, const Draws* r, Flight* flight, SCENE_ARGS) {
+#if CLUME_NEE
+    LightSample s;
+    spectrum value;
+    uint word;
+    if (path_light_sample(x, d, phase, g, r, &s, &value, &word, SCENE)) return value * transmittance_estimate(x, s.direction, s.distance, word, r, flight, SCENE);
+#endif
+    return (spectrum)0.0f;
+}
+
+/// What a ray that escapes finds.
+static spectrum path_background(float3 d, float phase_pdf, uint depth, __constant const RenderParams* params, __global const LightInfo* lights, __global const float4* texels, __global const AliasEntry* alias) {
+#if LIGHT_ENVIRONMENTS && ((CLUME_LIGHTS & CLUME_HITS) || CLUME_VISIBLE_BACKGROUND)
+    return environment_radiance(d, phase_pdf, depth == 0, params, lights, texels, alias);
 #else
     return (spectrum)0.0f;
 #endif
+}
+
+/// What a ray that ends at t on an opaque surface finds, weighted against next-event estimation.
+static spectrum path_surface(uint surface, float3 o, float3 d, float t, float phase_pdf, uint depth, __global const LightInfo* lights) {
+#if LIGHT_SURFACES
+    const uint kind = lights[surface].kind;
+    if ((depth == 0 || (kind & CLUME_HITS)) && surface_emits(surface, o, d, lights)) {
+        const float other = depth > 0 && (kind & CLUME_NEE) ? surface_pdf(surface, o, d, t, lights) : 0.0f;
+        const float weight = depth > 0 ? divide_s(phase_pdf, phase_pdf + other) : 1.0f;
+        return to_spectrum(lights[surface].radiance) * weight;
+    }
+#endif
+    return (spectrum)0.0f;
 }
 
 /// One event; afterwards the path is alive, paused in its flight (still alive), or ended with its radiance complete.
@@ -91,20 +124,11 @@ static void path_event(Path* p, uint pixel, SCENE_ARGS) {
     if (result == FLIGHT_ESCAPED) {
         p->flags &= ~PATH_ALIVE;
         if (surface == NO_LIGHT) {
-#if LIGHT_ENVIRONMENTS && ((CLUME_LIGHTS & CLUME_HITS) || CLUME_VISIBLE_BACKGROUND)
-            p->radiance += p->beta * environment_radiance(p->d, p->phase_pdf, p->depth == 0, params, lights, texels, alias);
-#endif
-            return;
+            p->radiance += p->beta * path_background(p->d, p->phase_pdf, p->depth, params, lights, texels, alias);
+        } else {
+            if (p->depth == 0) p->flags |= PATH_ALPHA;
+            p->radiance += p->beta * path_surface(surface, p->o, p->d, t_end, p->phase_pdf, p->depth, lights);
         }
-#if LIGHT_SURFACES
-        if (p->depth == 0) p->flags |= PATH_ALPHA;
-        const uint kind = lights[surface].kind;
-        if ((p->depth == 0 || (kind & CLUME_HITS)) && surface_emits(surface, p->o, p->d, lights)) {
-            const float other = p->depth > 0 && (kind & CLUME_NEE) ? surface_pdf(surface, p->o, p->d, t_end, lights) : 0.0f;
-            const float weight = p->depth > 0 ? divide_s(p->phase_pdf, p->phase_pdf + other) : 1.0f;
-            p->radiance += p->beta * to_spectrum(lights[surface].radiance) * weight;
-        }
-#endif
         return;
     }
     if (p->depth == 0) p->flags |= PATH_ALPHA;

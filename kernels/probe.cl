@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Entry points that run one building block each over arrays: for the tests and the benchmarks.
 // The same code as in `render`, under the same defines.
-#include "path.cl"
+#include "lane_path.cl"
 #include "self_test.cl"
 
 /// out[i] = philox(counter[i], key[i].xy).
@@ -121,6 +121,52 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
     out[i] = r;
 }
 
+#if CLUME_LANES
+/// Free flights as of probe_ray with `what` = 1, CLUME_WIDTH side by side: each work-item does `each` of them.
+__kernel void probe_flights(SCENE_ARGS, __global const float4* rays, __global float4* out, uint count, uint sample, uint each) {
+    uint next = (uint)get_global_id(0) * each;
+    if (next >= count) return;
+    const uint last = min(next + each, count);
+    const LaneDraws draws = {(vuint)sample, (vuint)0u, (vuint)1u, (uint2)(params->seed_lo, params->seed_hi)};
+    LaneDraws r = draws;
+    LaneFlights f;
+    vfloat t_end = (vfloat)0.0f;
+    vint flying = (vint)0, result = (vint)FLIGHT_ESCAPED, waiting = (vint)0;
+    uint violations = 0;
+    for (;;) {
+        for (int i = 0; i < CLUME_WIDTH; ++i) {
+            if (LANE_OF(int, flying, i) || LANE_OF(int, waiting, i) || next == last) continue;
+            const float4 o = rays[2 * next], d = rays[2 * next + 1];
+            ((float*)&f.ox)[i] = o.x;
+            ((float*)&f.oy)[i] = o.y;
+            ((float*)&f.oz)[i] = o.z;
+            ((float*)&t_end)[i] = o.w;
+            ((float*)&f.dx)[i] = d.x;
+            ((float*)&f.dy)[i] = d.y;
+            ((float*)&f.dz)[i] = d.z;
+            ((float*)&f.t)[i] = 0.0f;
+            ((uint*)&f.draw)[i] = 0;
+            ((uint*)&r.pixel)[i] = next++;
+            ((int*)&waiting)[i] = -1;
+        }
+        vint out_now = flying | waiting;
+        if (!vany(out_now)) break;
+        const vint begun = lanes_begin(&f, t_end, &r, waiting, params, cells);
+        LANE_SET(result, (vint)FLIGHT_ESCAPED, waiting);
+        flying |= begun;
+        const int busy = lanes_count(flying);
+        if (busy > 0) lanes_fly(&f, &r, &flying, &result, busy * CLUME_LANES_ENOUGH / 16, &violations, SCENE);
+        const vint ended = out_now & ~flying;
+        waiting = ended & (result == (vint)FLIGHT_PAUSED);
+        for (int i = 0; i < CLUME_WIDTH; ++i) {
+            if (!LANE_OF(int, ended, i) || LANE_OF(int, waiting, i)) continue;
+            const bool collided = LANE_OF(int, result, i) == FLIGHT_COLLIDED;
+            out[LANE_OF(uint, r.pixel, i)] = (float4)(collided ? LANE_OF(float, f.t, i) : CLUME_INFINITY, collided ? as_float(LANE_OF(uint, f.primitive, i)) : as_float(CLUME_NO_PRIMITIVE), 1.0f, 0.0f);
+        }
+    }
+}
+#endif
+
 #if CLUME_GRIDS
 /// Ray i as in probe_ray, direction.w an optical depth tau, against grid g alone: out the depth up to t_end, where it reaches
 /// tau (CLUME_INFINITY if not), the density at along(o, d, t_end), the emission grid's integral up to t_end times emission.x.
@@ -160,5 +206,5 @@ __kernel void probe_phase(uint kind, float g, float3 d, uint seed, __global floa
     const uint4 bits = philox((uint4)(i, 0, 0, 0), (uint2)(seed, 1));
     float pdf;
     const float3 s = phase_sample(kind, g, d, bits, &pdf);
-    out[i] = (float4)(dot_s(s, d), pdf, phase_value(kind, g, phase_versine(g, d, s)), dot_s(s, s));
+    out[i] = (float4)(dot_s(s, d), pdf, phase_value_s(kind, g, phase_versine(g, d, s)), dot_s(s, s));
 }

@@ -15,26 +15,34 @@
 #define DRAW_LIGHT_MORE 0xf0000004u
 #define DRAW_SHADOW 0x40000000u  // and on: transmittance estimates
 
-/// 128 random bits; counter = (sample, pixel, depth, draw), key = seed. 64-bit products: some mul_hi are slow.
-static uint4 philox(uint4 counter, uint2 key) {
-    uint x = counter.x, y = counter.y, z = counter.z, w = counter.w, a = key.x, b = key.y;
-    for (int round = 0; round < 7; ++round) {
-        const ulong p = (ulong)x * 0xD2511F53u, q = (ulong)z * 0xCD9E8D57u;
-        x = (uint)(q >> 32) ^ y ^ a;
-        y = (uint)q;
-        z = (uint)(p >> 32) ^ w ^ b;
-        w = (uint)p;
-        a += 0x9E3779B9u;
-        b += 0xBB67AE85u;
-    }
-    return (uint4)(x, y, z, w);
+/// x · factor: its upper and lower words. 64-bit products, those of a vector by even and odd lanes: mul_hi is slow on some devices.
+static void product_s(uint x, uint factor, uint* high, uint* low) {
+    const ulong p = (ulong)x * factor;
+    *high = (uint)(p >> 32);
+    *low = (uint)p;
+}
+static void product_v(vuint x, uint factor, vuint* high, vuint* low) {
+#if CLUME_WIDTH == 1
+    product_s(x, factor, high, low);
+#else
+    const vpairs both = as_vpairs(x), even = (both & (vpairs)0xffffffffu) * (vpairs)factor, odd = (both >> (vpairs)32) * (vpairs)factor;
+    *high = pairs_as_vuint((even >> (vpairs)32) | (odd & (vpairs)0xffffffff00000000u));
+    *low = pairs_as_vuint((even & (vpairs)0xffffffffu) | (odd << (vpairs)32));
+#endif
 }
 
-/// floor(x · n / 2^32): uniform in [0, n) for 32 random bits, to within n 2^-32.
-static uint uniform_index(uint x, uint n) { return (uint)(((ulong)x * n) >> 32); }
+#include "scalar.inc.cl"
+#include "rng_body.inc.cl"
+#include "body_end.inc.cl"
+#include "vector.inc.cl"
+#include "rng_body.inc.cl"
+#include "body_end.inc.cl"
 
-/// Uniform in (0, 1): (x + 1/2) 2^-32 rounded to float, kept below 1; error < 1.3e-7 relative.
-static float uniform_s(uint x) { return min_s((from_uint_s(x) + 0.5f) * 0x1p-32f, 0x1.fffffep-1f); }
+static uint4 philox(uint4 counter, uint2 key) {
+    uint x = counter.x, y = counter.y, z = counter.z, w = counter.w;
+    philox_s(&x, &y, &z, &w, key);
+    return (uint4)(x, y, z, w);
+}
 
 /// 32 random bits per primitive id under a 64-bit key: a bijective mixer (three multiply-xorshift rounds). Keys are words of
 /// `philox`; ones that differ in a bit of y alone would not do.

@@ -70,11 +70,12 @@ __kernel void probe_math(__global const float* x, __global const float* y, __glo
     const float* bl = (const float*)&b;
     float* rl = (float*)&r;
     for (int i = 0; i < CLUME_WIDTH; ++i) {
+        float other;
         switch (function) {
             case PROBE_ASIN: rl[i] = asin_s(al[i]); break;
             case PROBE_ATAN2: rl[i] = atan2_s(al[i], bl[i]); break;
-            case PROBE_SIN_TURNS: rl[i] = sincos_turns_s(al[i]).x; break;
-            case PROBE_COS_TURNS: rl[i] = sincos_turns_s(al[i]).y; break;
+            case PROBE_SIN_TURNS: rl[i] = sincos_turns_s(al[i], &other); break;
+            case PROBE_COS_TURNS: sincos_turns_s(al[i], &rl[i]); break;
             case PROBE_UNIFORM: rl[i] = uniform_s(as_uint(al[i])); break;
             case PROBE_ACOS: rl[i] = acos_s(al[i]); break;
             case PROBE_NORMALIZE_X: rl[i] = normalize_s((float3)(al[i], bl[i], bl[i])).x; break;

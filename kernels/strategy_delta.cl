@@ -81,7 +81,7 @@ static int null_collisions(const int mode, float3 o, float3 d, float t_end, Flig
                 break;
             }
             t = min_s(fma(tau, rcp_s(rate), t), end);
-            const Reference slot = references[w.entry.reference + uniform_index(slot_bits, w.entry.count)];
+            const Reference slot = references[w.entry.reference + uniform_index_s(slot_bits, w.entry.count)];
             // Arithmetic, not a branch: which of the two can't be predicted.
             const uint own = (uint)(threshold_bits < slot.threshold);
             const uint primitive = slot.other + (slot.own - slot.other) * own;

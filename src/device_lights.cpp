@@ -36,13 +36,13 @@ double add_environment(const Light& light, DeviceScene& out, device::LightInfo& 
     double total = 0;
     for (std::size_t i = 0; i < n; ++i) {
         const auto row = static_cast<double>(i / w);
-        const double solid_angle = 2 * pi / static_cast<double>(w) *
-                                   (std::sin(pi * (0.5 - row / static_cast<double>(h))) - std::sin(pi * (0.5 - (row + 1) / static_cast<double>(h))));
+        // sin a − sin b = 2 cos((a + b)/2) sin((a − b)/2), which cancels nothing at the poles.
+        const double solid_angle = 4 * pi / static_cast<double>(w) * std::cos(pi * (0.5 - (row + 0.5) / static_cast<double>(h))) * std::sin(pi * 0.5 / static_cast<double>(h));
         const glm::dvec3 rgb = glm::dvec3(light.image.rgb[3 * i], light.image.rgb[3 * i + 1], light.image.rgb[3 * i + 2]) * light.scale;
         masks.grey = masks.grey && is_grey(rgb);
         masks.brightest = std::max(masks.brightest, largest(rgb));
-        out.texels.push_back(pack(rgb));
-        weight[i] = largest(rgb) * solid_angle;
+        const device::float4& texel = out.texels.emplace_back(pack(rgb));
+        weight[i] = static_cast<double>(std::max({texel.x, texel.y, texel.z})) * solid_angle;  // of what the device has
         total += weight[i];
         out.alias.push_back({0xffffffffu, static_cast<device::uint>(i), static_cast<float>(solid_angle), 0});
     }

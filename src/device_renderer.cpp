@@ -10,7 +10,7 @@
 namespace clume {
 namespace {
 
-constexpr std::size_t kLocalSize = 8;
+constexpr std::size_t kLocalSize = 8;  // rows of sums that a work-group fills, or as many as one work-item does
 constexpr std::size_t kFewestItems = 64;  // of a piece: a device without room for these is of no use
 constexpr unsigned kFirstBatchArg = SceneBuffers::kArgs + 1;  // after the scene and the pixels
 
@@ -31,6 +31,7 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
       pixels_(queue_, pixels),
       unfinished_(queue_, 1),
       raised_(scene.learned.size(), 0.0f),
+      lanes_(scene.lanes ? static_cast<std::size_t>(vector_width_of(info, vector_width)) : 1),
       wanted_items_(items_wanted(info)) {
     ProgramOptions options;
     options.optimised = optimised;
@@ -45,13 +46,17 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
         states_ = Buffer<device::PathState>(queue_, kLocalSize);
         sums_ = Buffer<std::uint64_t>(queue_, kLocalSize * FILM_WORDS);
         set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(0), cl_uint(1), cl_uint(1), cl_uint(0), cl_uint(0), cl_uint(0));
-        queue_.launch(kernel_, kLocalSize, kLocalSize);
+        launch(kLocalSize);
     }
 }
 
 std::uint64_t DeviceRenderer::batch_bytes(const DeviceInfo& info, const std::vector<Tile>& tiles) {
     const std::size_t items = std::max<std::size_t>(tiles.empty() ? 0 : tiles.front().count, items_wanted(info));
     return items * (sizeof(device::PathState) + 2 * FILM_WORDS * sizeof(std::uint64_t));
+}
+
+void DeviceRenderer::launch(std::size_t rows) {
+    queue_.launch(kernel_, (rows + lanes_ - 1) / lanes_, std::max<std::size_t>(1, kLocalSize / lanes_));
 }
 
 void DeviceRenderer::aim(FilmSums& film, std::uint64_t seed) {
@@ -93,7 +98,7 @@ DeviceRenderer::Piece DeviceRenderer::render(std::size_t first, std::size_t coun
         unfinished_.upload(std::span(&none, 1));
         set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(first), cl_uint(count), cl_uint(piece.splits), cl_uint(begin),
                  cl_uint(end), resume);
-        queue_.launch(kernel_, items, kLocalSize);
+        launch(items);
         device::uint left = 0;
         unfinished_.download(std::span(&left, 1));
         alive();

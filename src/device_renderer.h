@@ -54,6 +54,8 @@ private:
     };
     /// Renders samples [begin, end) of the pixels.
     Piece render(std::size_t first, std::size_t count, std::uint32_t begin, std::uint32_t end);
+    /// One launch of the kernel for `rows` rows of sums.
+    void launch(std::size_t rows);
     /// Uploads what aim() and set_learned() have left to do: all calls that may fail or hang are made inside run().
     void upload_changes();
 
@@ -72,7 +74,8 @@ private:
     std::vector<device::uint> found_;        ///< raised bounds after the batch last run
     std::vector<float> raised_;
     bool aimed_ = false;                     ///< params_ are on the device
-    std::size_t wanted_items_;               ///< work-items that keep the device busy
+    std::size_t lanes_;                      ///< rows of sums that a work-item fills
+    std::size_t wanted_items_;               ///< rows that keep the device busy
     std::size_t most_items_ = SIZE_MAX;      ///< work-items that fit its memory, as far as known
     std::size_t short_of_memory_ = 0;
 };

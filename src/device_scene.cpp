@@ -316,6 +316,9 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     if (r.root_finding == "bisection") define("CLUME_BISECTION", 1);
     define("CLUME_ACCEL", wanted.bvh ? 2 : 1);
     define("CLUME_COUNT", options.count_work || out.strategy == "progressive");  // its look-ups are reported
+    // Null collisions under the cells' bounds look at one primitive at a time: vectors are of rays, not of primitives.
+    out.lanes = out.strategy == "delta" && out.bound != "scene" && scene.grids.empty() && !options.count_work;
+    define("CLUME_LANES", out.lanes);
     if (wanted.bvh) define("CLUME_BVH_STACK", std::max(1u, out.bvh_stack));  // OpenCL C knows no empty arrays
     define("CLUME_MIXTURE", !out.ellipsoids.empty() || scene.grids.empty());
     define_grids(scene, voxels, out);

@@ -38,6 +38,7 @@ struct DeviceScene {
     std::vector<std::pair<std::string, std::string>> defines;  ///< of the render program, but CLUME_WIDTH
     std::vector<std::pair<std::string, std::string>> explain;  ///< feature → what the program does about it
     std::string strategy, transmittance, bound;                ///< what `auto` became
+    bool lanes = false;                                        ///< a work-item follows as many paths as vectors are wide
     std::uint32_t bvh_stack = 0;                               ///< entries of a traversal's stack
     std::vector<Ellipsoid> ellipsoids;
     std::vector<std::array<glm::dvec3, 8>> grid_boxes;         ///< per grid that holds anything: corners around it, world units

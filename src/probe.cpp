@@ -39,7 +39,8 @@ struct Probe::Impl {
     Impl(const DeviceInfo& info, const DeviceScene& device_scene, const ProgramOptions& options)
         : code(compiled(info, options)),
           queue(code.queue),
-          scene(queue, device_scene) {}
+          scene(queue, device_scene),
+          lanes(device_scene.lanes) {}
 
     /// Sets the arguments and launches `items` work-items. The first launch of a kernel is preceded by one of a single
     /// work-group, so that the time returned holds no code generation.
@@ -70,6 +71,7 @@ struct Probe::Impl {
     Compiled& code;
     Queue& queue;
     SceneBuffers scene;
+    bool lanes;  ///< flights go side by side
 };
 
 Probe::Probe(const DeviceInfo& info, const DeviceScene& scene, int width) : width_(vector_width_of(info, width)) {
@@ -92,7 +94,17 @@ ProbeRun<ProbeHit> Probe::rays(std::span<const ProbeRay> rays, std::uint32_t sam
     return result;
 }
 
-ProbeRun<ProbeHit> Probe::flights(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 1); }
+ProbeRun<ProbeHit> Probe::flights(std::span<const ProbeRay> r, std::uint32_t sample) {
+    if (!impl_->lanes || width_ == 1) return rays(r, sample, 1);
+    Impl& s = *impl_;
+    const std::size_t each = 16 * static_cast<std::size_t>(width_);
+    Buffer<ProbeRay> in(s.queue, r);
+    Buffer<ProbeHit> out(s.queue, r.size());
+    ProbeRun<ProbeHit> result;
+    result.device_s = s.run_in_scene("probe_flights", (r.size() + each - 1) / each, in, out, cl_uint(r.size()), cl_uint(sample), cl_uint(each));
+    result.values = out.download();
+    return result;
+}
 ProbeRun<ProbeHit> Probe::transmittances(std::span<const ProbeRay> r) { return rays(r, 0, 2); }
 ProbeRun<ProbeHit> Probe::roulette_transmittances(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 4); }
 

@@ -97,9 +97,12 @@ StressResult run_stress(const DeviceInfo& info, const StressOptions& options, co
     StressDevice device(info);
     const auto part = [&](double from, double to) { return [&progress, from, to](double share) { progress(from + share * (to - from)); }; };
     stress_math(device, options, result, part(0, 0.2));
-    stress_chords(device, options, result, part(0.2, 0.9));
-    stress_sums(device, options, result, part(0.9, 0.95));
-    stress_sampling(device, options, result, part(0.95, 1));
+    stress_chords(device, options, result, part(0.2, 0.65));
+    stress_given(device, options, result, part(0.65, 0.85));
+    stress_sums(device, options, result, part(0.85, 0.9));
+    stress_sampling(device, options, result, part(0.9, 0.93));
+    stress_lights(device, options, result, part(0.93, 0.96));
+    stress_environment(device, options, result, part(0.96, 1));
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return result;
 }

@@ -12,6 +12,7 @@
 #include "src/device_mixture.h"
 #include "src/parallel.h"
 #include "src/stress_families.h"
+#include "src/stress_lines.h"
 #include "src/stress_parts.h"
 
 namespace clume {
@@ -20,9 +21,7 @@ namespace {
 using oracle::Real;
 using oracle::Vector;
 
-constexpr float kNever = 1e30f;
-constexpr double kUlp = 0x1p-23;    ///< of positions
-constexpr double kFloor = 0x1p-98;  ///< what is below 2^-100 counts as 0
+constexpr double kUlp = 0x1p-23;  ///< of positions
 
 double num(const Real& r) { return static_cast<double>(r); }
 Real real(float v) { return Real(static_cast<double>(v)); }
@@ -42,7 +41,7 @@ struct Answers {
 
 struct Ends {
     double t_in, t_out;
-    bool hit() const { return t_in < static_cast<double>(kNever); }
+    bool hit() const { return t_in < static_cast<double>(kStressNever); }
 };
 
 /// What one case gave.
@@ -106,32 +105,6 @@ bool quadratic_of(const ChordCase& c, std::vector<float>& lane, oracle::Ellipsoi
     return true;
 }
 
-double beyond(const Real& off, const Real& size) { return off > 0 ? (size > 0 ? num(off / size) : INFINITY) : 0; }
-
-/// How far `got` lies outside what lines nearby have, as a share; below `floor` all is 0.
-double outside(const oracle::Range& range, double got, double floor) {
-    const Real least = range.lo < Real(floor) ? Real(0) : range.lo, value = got;
-    return std::max(beyond(least - value, least), got > floor ? beyond(value - range.hi, range.hi) : 0);
-}
-
-StressError flight_error(const oracle::Line256& line, const ProbeGroupRay& ray, double got, double shift, double& relative) {
-    StressError e;
-    const Real t0 = real(ray.t0), tau = real(ray.tau);
-    if (!std::isfinite(got)) {
-        e.nonfinite = true;
-        e.error = INFINITY;
-        return e;
-    }
-    if (got >= static_cast<double>(kNever)) {
-        e.error = beyond(line.depth_near(t0, Real(kNever), shift).lo - tau, tau);
-    } else {
-        const Real after = line.depth_near(t0, Real(got + shift), shift).hi, before = line.depth_near(t0, Real(got - shift), shift).lo;
-        e.error = std::max(beyond(tau - after, tau), beyond(before - tau, tau));
-        relative = num(abs(line.depth(t0, Real(got)) - tau) / tau);
-    }
-    return e;
-}
-
 Findings judge(const Work& work, std::size_t i, const Limits& limits) {
     const ChordCase& c = work.cases[i];
     const Answers& a = work.answers;
@@ -165,7 +138,7 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
         const Real exact = c.device.density_at(point);
         const double got = static_cast<double>(a.density[i].density[0]);
         f.density = compare_to(got, exact, LimitUnit::relative);
-        if (!f.density.nonfinite) f.density.error = outside(c.device.density_near(point, shift), got, kFloor * std::max(1.0, num(c.device.sigma)));
+        if (!f.density.nonfinite) f.density.error = beyond_range(c.device.density_near(point, shift), got, kStressFloor * std::max(1.0, num(c.device.sigma)));
         const Real rounded = c.scene.density_at(point);
         f.density.rounding = rounded > 0 ? num(abs(exact - rounded) / rounded) : NAN;
     }
@@ -174,13 +147,13 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
     const double got = static_cast<double>(a.used[i].depth[0]);
     f.depth = compare_to(got, exact, LimitUnit::relative);
     const oracle::Range range = line.depth_near(t0, t1, shift, line.brief() ? kUlp * std::abs(num(line.t_perp)) : 0);
-    if (!f.depth.nonfinite) f.depth.error = outside(range, got, kFloor);
+    if (!f.depth.nonfinite) f.depth.error = beyond_range(range, got, kStressFloor);
     const Real rounded = scene_line.depth(t0, t1);
     if (rounded > 0) f.depth.rounding = num(abs(exact - rounded) / rounded);
     const double naive = static_cast<double>(a.naive[i].depth[0]);
-    f.depth.naive = std::isfinite(naive) ? outside(range, naive, kFloor) : INFINITY;
-    if (exact > Real(kFloor)) f.naive_depth = std::isfinite(naive) ? num(abs(Real(naive) - exact) / exact) : INFINITY;
-    f.not_additive = std::abs(static_cast<double>(a.first[i].depth[0]) + static_cast<double>(a.second[i].depth[0]) - got) > limits.additivity.value * got + kFloor * std::max(1.0, 8 * c.density);
+    f.depth.naive = std::isfinite(naive) ? beyond_range(range, naive, kStressFloor) : INFINITY;
+    if (exact > Real(kStressFloor)) f.naive_depth = std::isfinite(naive) ? num(abs(Real(naive) - exact) / exact) : INFINITY;
+    f.not_additive = std::abs(static_cast<double>(a.first[i].depth[0]) + static_cast<double>(a.second[i].depth[0]) - got) > limits.additivity.value * got + kStressFloor * std::max(1.0, 8 * c.density);
     float before = a.first[i].depth[0];
     for (const auto& rise : a.rising) {
         f.not_monotone = f.not_monotone || static_cast<double>(rise[i].depth[0]) < static_cast<double>(before) * (1 - limits.monotonicity.value);
@@ -188,34 +161,25 @@ Findings judge(const Work& work, std::size_t i, const Limits& limits) {
     }
 
     const Real t = line.invert(t0, real(ray.tau));
-    f.collides = t >= 0 || a.flights[i].flight[0] < kNever;
+    f.collides = t >= 0 || a.flights[i].flight[0] < kStressNever;
     double relative = NAN, naive_relative = NAN;
-    f.flight = flight_error(line, ray, static_cast<double>(a.flights[i].flight[0]), shift, relative);
+    f.flight = flight_error(line, t0, real(ray.tau), static_cast<double>(a.flights[i].flight[0]), shift, relative);
     f.flight.relative = relative;
     if (f.flight.nonfinite) return f;
-    f.flight.naive = flight_error(line, ray, static_cast<double>(a.naive_flights[i].flight[0]), shift, naive_relative).error;
-    f.naive_flight = t >= 0 && a.naive_flights[i].flight[0] >= kNever ? 1 : naive_relative;
-    f.lost_flight = t >= 0 && a.flights[i].flight[0] >= kNever;
-    f.invented_flight = t < 0 && a.flights[i].flight[0] < kNever;
-    if (t >= 0 && a.flights[i].flight[0] < kNever) f.flight.ulp = std::abs(num(Real(static_cast<double>(a.flights[i].flight[0])) - t)) / kUlp;
+    f.flight.naive = flight_error(line, t0, real(ray.tau), static_cast<double>(a.naive_flights[i].flight[0]), shift, naive_relative).error;
+    f.naive_flight = t >= 0 && a.naive_flights[i].flight[0] >= kStressNever ? 1 : naive_relative;
+    f.lost_flight = t >= 0 && a.flights[i].flight[0] >= kStressNever;
+    f.invented_flight = t < 0 && a.flights[i].flight[0] < kStressNever;
+    if (t >= 0 && a.flights[i].flight[0] < kStressNever) f.flight.ulp = std::abs(num(Real(static_cast<double>(a.flights[i].flight[0])) - t)) / kUlp;
     const Real scene_t = scene_line.invert(t0, real(ray.tau));
     if (t >= 0 && scene_t >= 0) f.flight.rounding = num(abs(line.depth(t0, scene_t) - real(ray.tau)) / real(ray.tau));
-    if (a.flights[i].flight[0] < kNever) {
+    if (a.flights[i].flight[0] < kStressNever) {
         const double tau = static_cast<double>(ray.tau), blur = line.brief() ? num(2 * kUlp * abs(line.t_perp) / line.reach()) : 0, e = limits.flight.value + limits.depth.value + blur;
         // A flight that ends as near the exit as the exit is known has been judged by the lines beside it.
         const bool at_exit = a.flights[i].flight[0] + static_cast<float>(shift) >= a.flights[i].t_out[0];
-        f.no_round_trip = static_cast<double>(a.early[i].depth[0]) > tau * (1 + e) + kFloor || (!at_exit && static_cast<double>(a.late[i].depth[0]) < tau * (1 - e));
+        f.no_round_trip = static_cast<double>(a.early[i].depth[0]) > tau * (1 + e) + kStressFloor || (!at_exit && static_cast<double>(a.late[i].depth[0]) < tau * (1 - e));
     }
     return f;
-}
-
-/// Groups whose lanes all hold the case's primitive.
-std::vector<float> pack_groups(const std::vector<std::vector<float>>& lanes) {
-    std::vector<float> groups(lanes.size() * CLUME_GROUP_FLOATS);
-    for (std::size_t i = 0; i < lanes.size(); ++i)
-        for (std::size_t r = 0; r < CLUME_GROUP_ROWS; ++r)
-            for (std::size_t k = 0; k < CLUME_GROUP_SIZE; ++k) groups[i * CLUME_GROUP_FLOATS + r * CLUME_GROUP_SIZE + k] = lanes[i][r];
-    return groups;
 }
 
 void ask_device(StressDevice& device, Work& w, StressRandom& random, double shift) {
@@ -236,7 +200,7 @@ void ask_device(StressDevice& device, Work& w, StressRandom& random, double shif
     a.quadratic = probe.groups(w.rays, pack_groups(squares), bit, e2, true);
     a.naive = device.naive(w.rays, groups, bit, e2);
     std::vector<ProbeGroupRay> open = w.rays;  // flights end where the chord does
-    for (ProbeGroupRay& r : open) r.t1 = kNever;
+    for (ProbeGroupRay& r : open) r.t1 = kStressNever;
     a.flights = ask(open);
     a.naive_flights = device.naive(open, groups, bit, e2);
 
@@ -247,16 +211,16 @@ void ask_device(StressDevice& device, Work& w, StressRandom& random, double shif
         const ProbeChord& c = a.used[i];
         const ProbeGroupRay& r = w.rays[i];
         float begin = r.t0, end = std::min(r.t1, 4.0f);
-        if (c.t_in[0] < kNever) begin = std::max(begin, c.t_in[0]), end = std::min(end, c.t_out[0]);
+        if (c.t_in[0] < kStressNever) begin = std::max(begin, c.t_in[0]), end = std::min(end, c.t_out[0]);
         const double part = random.below(2) ? random.uniform() : random.spread(1e-4, 1);
         float middle = static_cast<float>(static_cast<double>(begin) + part * (static_cast<double>(end) - static_cast<double>(begin)));
         middle = std::clamp(middle, r.t0, std::max(r.t0, r.t1));
         w.middles.push_back(middle);
         first[i].t1 = second[i].t0 = middle;
-        rising[0][i].t1 = std::nextafter(middle, kNever);
-        rising[1][i].t1 = std::nextafter(rising[0][i].t1, kNever);
+        rising[0][i].t1 = std::nextafter(middle, kStressNever);
+        rising[1][i].t1 = std::nextafter(rising[0][i].t1, kStressNever);
         rising[2][i].t1 = std::max(rising[1][i].t1, static_cast<float>(static_cast<double>(middle) * (1 + 1e-6)));
-        w.density_rays[i].t0 = c.t_in[0] < kNever ? static_cast<float>(static_cast<double>(c.t_in[0]) + random.uniform() * (static_cast<double>(c.t_out[0]) - static_cast<double>(c.t_in[0]))) : middle;
+        w.density_rays[i].t0 = c.t_in[0] < kStressNever ? static_cast<float>(static_cast<double>(c.t_in[0]) + random.uniform() * (static_cast<double>(c.t_out[0]) - static_cast<double>(c.t_in[0]))) : middle;
         const double flight = static_cast<double>(a.flights[i].flight[0]);
         early[i].t1 = static_cast<float>(flight - shift);
         late[i].t1 = static_cast<float>(flight + shift);
@@ -270,8 +234,6 @@ std::string describe(const ChordCase& c) {
                        c.ray.t0, c.ray.t1, c.ray.tau, c.ray.origin[0], c.ray.origin[1], c.ray.origin[2], c.ray.direction[0], c.ray.direction[1], c.ray.direction[2],
                        fmt::join(c.lane.begin(), c.lane.begin() + CLUME_ROW_ID, " "));
 }
-
-const char* kernel_name(KernelFamily k) { return k == KernelFamily::gaussian ? "gaussian" : k == KernelFamily::epanechnikov ? "epanechnikov" : "uniform"; }
 
 void add_rows(const Work& w, std::vector<Findings>& found, const Limits& limits, const StressOptions& options, StressResult& result) {
     const std::string family = w.family.name, kernel = kernel_name(w.kernel);

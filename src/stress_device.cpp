@@ -57,6 +57,16 @@ std::vector<ProbeChord> StressDevice::naive(std::span<const ProbeGroupRay> rays,
     return out.download();
 }
 
+std::vector<StressDevice::Given> StressDevice::given(std::span<const ProbeGroupRay> rays, std::span<const float> groups, device::uint family, float e2) {
+    Impl& s = *impl_;
+    static_assert(sizeof(Given) == 48);
+    Buffer<float> in(s.queue, groups);
+    Buffer<ProbeGroupRay> by(s.queue, rays);
+    Buffer<Given> out(s.queue, rays.size());
+    s.run("stress_given", nullptr, rays.size(), in, by, out, cl_uint(rays.size()), cl_uint(family), e2);
+    return out.download();
+}
+
 StressDevice::Phase StressDevice::phase(device::uint kind, std::span<const device::float4> directions, std::span<const float> versines, std::span<const StressBits> bits) {
     Impl& s = *impl_;
     Buffer<device::float4> d(s.queue, directions), out(s.queue, directions.size());
@@ -85,6 +95,17 @@ std::vector<StressDevice::LightSample> StressDevice::lights(const DeviceScene& s
     Buffer<LightSample> out(s.queue, points.size());
     s.run("stress_light", &buffers, points.size(), in, words, out, cl_uint(points.size()));
     return out.download();
+}
+
+StressDevice::EnvironmentSample StressDevice::environment(const DeviceScene& scene, std::span<const StressBits> bits, std::span<const device::float4> directions) {
+    Impl& s = *impl_;
+    const SceneBuffers buffers(s.queue, scene);
+    const std::size_t n = directions.size();
+    Buffer<StressBits> words(s.queue, bits), texels(s.queue, n);
+    Buffer<device::float4> in(s.queue, directions), out(s.queue, n);
+    Buffer<float> values(s.queue, n);
+    s.run("stress_environment", &buffers, n, words, in, out, values, texels, cl_uint(n));
+    return {out.download(), values.download(), texels.download()};
 }
 
 std::vector<float> StressDevice::transmittances(const DeviceScene& scene, std::span<const ProbeRay> rays) {

@@ -26,6 +26,14 @@ public:
     /// The textbook's formulas; only lane 0 of each group is looked at, and no density is given.
     std::vector<ProbeChord> naive(std::span<const ProbeGroupRay> rays, std::span<const float> groups, device::uint family, float e2);
 
+    struct Given {
+        float t_perp, w, d2, has;              ///< the geometry; has: some of the chord lies between t0 and t1
+        float start, stop, depth, flight;      ///< that part, its depth, the flight from its start
+        float naive_depth, naive_flight, unused[2];
+    };
+    /// Of each group's first primitive.
+    std::vector<Given> given(std::span<const ProbeGroupRay> rays, std::span<const float> groups, device::uint family, float e2);
+
     struct Phase {
         std::vector<device::float4> directions;  ///< w: pdf
         std::vector<float> values;               ///< at the versines given
@@ -44,6 +52,14 @@ public:
     };
     /// Two blocks of bits per point.
     std::vector<LightSample> lights(const DeviceScene& scene, std::span<const device::float4> points, std::span<const StressBits> bits);
+
+    struct EnvironmentSample {
+        std::vector<device::float4> directions;  ///< w: pdf
+        std::vector<float> values;
+        std::vector<StressBits> texels;  ///< sampled, found along the sample, found along the direction given
+    };
+    /// Of light 0, an image; two blocks of bits per sample, and as many directions to look up.
+    EnvironmentSample environment(const DeviceScene& scene, std::span<const StressBits> bits, std::span<const device::float4> directions);
 
     /// Sums of the mixture's optical depths as transmittances; the scene has a bvh.
     std::vector<float> transmittances(const DeviceScene& scene, std::span<const ProbeRay> rays);

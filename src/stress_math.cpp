@@ -158,14 +158,14 @@ void stress_math(StressDevice& device, const StressOptions& options, StressResul
     for (Inputs& i : complemented)
         for (float& v : i.x) v = from_bits(~bits(v));
     c.check("−log(1 − u) of bits", MathFunction::exponential, body, "FN(exponential)", complemented, [](float a, float) { return -log(1 - u_of(from_bits(~bits(a)))); });
-    c.check("bits to (0, 1)", MathFunction::uniform, "rng.cl", "uniform_s", counters(n, random), [](float a, float) { return u_of(a); });
+    c.check("bits to (0, 1)", MathFunction::uniform, "rng_body.inc.cl", "FN(uniform)", counters(n, random), [](float a, float) { return u_of(a); });
     c.check("bits to float", MathFunction::from_uint, body, "FN(from_uint)", counters(n, random), [](float a, float) { return Real(bits(a)); });
     c.check("erfc", MathFunction::erfc, body, "FN(erfc)", in({0, 8}, true), [](float a, float) { return oracle::erfc(real(a)); });
     c.check("erfc⁻¹", MathFunction::erfc_inverse, body, "FN(erfc_inverse)", in({0x1.000002p-90, 1}), [](float a, float) { return oracle::erfc_inverse(real(a)); });
     c.check("erf(b) − erf(a)", MathFunction::erf_between, "ellipsoid.cl", "erf_between", intervals(n, random), [](float a, float b) { return oracle::erf_between(real(a), real(b)); });
     c.check("Epanechnikov depth⁻¹", MathFunction::epanechnikov_inverse, body, "FN(epanechnikov_inverse)", in({0, 2.0 / 3.0}, true), [](float a, float) { return epanechnikov_inverse(real(a)); });
-    c.check("sin 2πx", MathFunction::sin_turns, math, "sincos_turns_s", in({0, 1}, true), [](float a, float) { return sin(2 * oracle::pi() * real(a)); });
-    c.check("cos 2πx", MathFunction::cos_turns, math, "sincos_turns_s", in({0, 1}, true), [](float a, float) { return cos(2 * oracle::pi() * real(a)); });
+    c.check("sin 2πx", MathFunction::sin_turns, body, "FN(sincos_turns)", in({0, 1}, true), [](float a, float) { return sin(2 * oracle::pi() * real(a)); });
+    c.check("cos 2πx", MathFunction::cos_turns, body, "FN(sincos_turns)", in({0, 1}, true), [](float a, float) { return cos(2 * oracle::pi() * real(a)); });
     c.check("asin", MathFunction::asin, math, "asin_s", in({0, 1, true}, true), [](float a, float) { return asin(real(a)); });
     c.check("acos", MathFunction::acos, math, "acos_s", in({0, 1, true}, true), [](float a, float) { return acos(real(a)); });
     const Domain plane{1e-12, 1e12, true};

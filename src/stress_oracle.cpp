@@ -145,12 +145,16 @@ Line256::Line256(const Ellipsoid256& e, const Vector& o, const Vector& d) : e_(e
     gradient_ = distance > 0 ? Real(sqrt(dot(g, g)) / distance) : across_;
 }
 
+Line256::Line256(const Ellipsoid256& e, const Real& foot, const Real& scale, const Real& d2)
+    : t_perp(foot), w(scale), distance(sqrt(d2)), e_(e), given_(true), half_(d2 < e.e2 ? Real(sqrt(e.e2 - d2)) : Real(0)), across_(0), along_(scale), gradient_(1) {}
+
 Real Line256::tangency() const { return abs(sqrt(e_.e2) - distance) / gradient_; }
 
 Real Line256::depth_at(const Real& d, Real u0, Real u1, const Real& more) const {
     const Real square = e_.e2 - d * d;
     if (!(square > 0)) return 0;
-    const Real h = e_.family == KernelFamily::uniform ? Real(sqrt(square) + more) : Real(sqrt(square));
+    const bool blurred = e_.family == KernelFamily::uniform || (given_ && e_.family == KernelFamily::gaussian);
+    const Real h = blurred ? Real(sqrt(square) + more) : Real(sqrt(square));
     u0 = std::max(u0, Real(-h));
     u1 = std::min(u1, h);
     if (!(u0 < u1)) return 0;

@@ -60,6 +60,9 @@ struct Ellipsoid256 {
 class Line256 {
 public:
     Line256(const Ellipsoid256& e, const Vector& o, const Vector& d);
+    /// The line with that t⊥, w and squared whitened distance, which can be moved along alone: no tangency. `blur` moves the ends of a
+    /// Gaussian's chord too.
+    Line256(const Ellipsoid256& e, const Real& t_perp, const Real& w, const Real& d2);
 
     Real t_perp, w, distance;  ///< t of the foot, |W d|, whitened distance
     bool hit() const { return half_ > 0; }
@@ -80,8 +83,9 @@ public:
 
 private:
     const Ellipsoid256& e_;
+    bool given_ = false;                     ///< by t⊥, w and distance
     Real half_, across_, along_, gradient_;  ///< half chord; greatest whitened length of a unit step across, along the line; slope of `distance`
-    Real depth_at(const Real& d, Real u0, Real u1, const Real& more = 0) const;  ///< `more`: of the half chord, if its ends matter (uniform)
+    Real depth_at(const Real& d, Real u0, Real u1, const Real& more = 0) const;  ///< `more`: of the half chord, where its ends matter
 };
 
 }  // namespace clume::oracle

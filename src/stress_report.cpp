@@ -79,12 +79,12 @@ Table families_table(const StressResult& result) {
     Table rows{{"family (Gaussian)", "ends [ulp of the radius]", "by c − b²/a", "hits lost / invented", "depth, relative", "nothing forgiven", "by erf(b) − erf(a)", "flight, relative of τ", "inverted from t = 0",
                 "additivity, monotonicity, round trip"}};
     const std::string suffix = ", gaussian";
-    const auto find = [&](const char* function, const std::string& family) {
-        return std::find_if(result.rows.begin(), result.rows.end(), [&](const StressRow& r) { return r.function == function && r.family == family; });
+    const auto find = [&](const char* quantity, const std::string& family) {
+        return std::find_if(result.rows.begin(), result.rows.end(), [&](const StressRow& r) { return r.quantity == quantity && r.family == family; });
     };
     for (const StressRow& ends : result.rows) {
         if (ends.function != "intersect" || !ends.family.ends_with(suffix)) continue;
-        const auto depth = find("depth_part", ends.family), flight = find("flight_part", ends.family);
+        const auto depth = find("optical depth", ends.family), flight = find("free flight", ends.family);
         rows.push_back({ends.family.substr(0, ends.family.size() - suffix.size()), figure(ends.error.worst), figure(ends.naive.worst), fmt::format("{} / {} of {}", ends.lost.count, ends.invented.count, ends.cases), figure(depth->error.worst),
                         figure(depth->relative.worst), figure(depth->naive.worst), figure(flight->error.worst), figure(flight->naive.worst),
                         fmt::format("{}, {}, {}", depth->additivity.count, depth->monotonicity.count, flight->round_trip.count)});

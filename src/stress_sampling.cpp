@@ -1,35 +1,68 @@
 // SPDX-License-Identifier: MIT
-// Phase functions and their sampling, light samples and camera rays, each against the exact map of the same random bits. The
-// uniform numbers that a map starts from are taken as the floats they are; how bits become them is judged in stress_math.
+// Phase functions and their sampling, and camera rays, each against the exact map of the same random bits. The uniform numbers
+// that a map starts from are taken as the floats they are; how bits become them is judged in stress_math.
+#include "src/stress_sampling.h"
+
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <fmt/format.h>
 
 #include "src/device_scene.h"
+#include "src/device_values.h"
 #include "src/parallel.h"
-#include "src/stress_families.h"
 #include "src/stress_parts.h"
 
 namespace clume {
-namespace {
 
 using oracle::Real;
 using oracle::Vector;
 
-double num(const Real& r) { return static_cast<double>(r); }
-
-/// uniform_s of rng.cl: every step is exactly rounded on any machine.
-Real uniform(std::uint32_t x) { return static_cast<double>(std::min((static_cast<float>(x) + 0.5f) * 0x1p-32f, 0x1.fffffep-1f)); }
+Real stress_uniform(std::uint32_t x) { return static_cast<double>(std::min((static_cast<float>(x) + 0.5f) * 0x1p-32f, 0x1.fffffep-1f)); }
 
 /// The map of phase.cl's `around`, for d of length 1 exactly, from 1 − c.
 Vector around(const Vector& d, const Real& versine, const Real& turn) {
     const Real c = 1 - versine, s = sqrt(versine * (2 - versine)), phi = 2 * oracle::pi() * turn;
-    const Real sign = std::signbit(num(d[2])) ? -1 : 1, a = -1 / (sign + d[2]), b = d[0] * d[1] * a;
+    const Real sign = std::signbit(static_cast<double>(d[2])) ? -1 : 1, a = -1 / (sign + d[2]), b = d[0] * d[1] * a;
     const Vector u{1 + sign * d[0] * d[0] * a, sign * b, -sign * d[0]}, v{b, sign + d[1] * d[1] * a, -d[1]};
     const Real cosine = s * cos(phi), sine = s * sin(phi);
     return {c * d[0] + cosine * u[0] + sine * v[0], c * d[1] + cosine * u[1] + sine * v[1], c * d[2] + cosine * u[2] + sine * v[2]};
 }
+
+glm::dvec3 some_direction(StressRandom& random) {
+    if (random.below(4) == 0) {  // axes, with signed zeros, and next to them
+        glm::dvec3 d(random.below(2) ? 0.0 : -0.0);
+        const int axis = random.below(3);
+        d[axis] = random.sign();
+        if (random.below(2)) d[(axis + 1) % 3] = random.sign() * random.spread(1e-12, 1e-3);
+        return d / glm::length(d);
+    }
+    return glm::normalize(glm::dvec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)));
+}
+
+StressBits some_bits(StressRandom& random) {
+    StressBits b;
+    for (auto& w : b.v) {
+        const int kind = random.below(6);
+        w = kind == 0 ? static_cast<std::uint32_t>(random.below(3)) : kind == 1 ? 0xffffffffu - static_cast<std::uint32_t>(random.below(3)) : kind == 2 ? random.word() >> random.below(32) : random.word();
+    }
+    return b;
+}
+
+StressError error_of(const Real& off, bool finite, const std::string& at) {
+    StressError e;
+    e.nonfinite = !finite;
+    e.error = finite ? static_cast<double>(off) : INFINITY;
+    e.at = at;
+    return e;
+}
+
+bool all_finite(std::initializer_list<float> values) {
+    return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
+}
+
+namespace {
+
+double num(const Real& r) { return static_cast<double>(r); }
 
 /// 1/sr, from 1 − c
 Real phase_value(device::uint kind, const Real& g, const Real& versine) {
@@ -42,13 +75,13 @@ Real phase_value(device::uint kind, const Real& g, const Real& versine) {
 
 /// 1 − c of the sampled direction.
 Real phase_versine(device::uint kind, const Real& g, const StressBits& bits) {
-    const Real u = uniform(bits.v[0]);
+    const Real u = stress_uniform(bits.v[0]);
     if (kind == PHASE_HENYEY_GREENSTEIN) {
         const Real denominator = 1 - g + 2 * g * u;
         return 2 * (1 - g) * (1 - g) * (1 - u) * (1 + g * u) / (denominator * denominator);
     }
     if (kind == PHASE_RAYLEIGH) {  // three quarters uniform, one quarter the largest of three
-        const Real first = uniform(bits.v[0] << 3), largest = std::max(first, std::max(uniform(bits.v[2]), uniform(bits.v[3])));
+        const Real first = stress_uniform(bits.v[0] << 3), largest = std::max(first, std::max(stress_uniform(bits.v[2]), stress_uniform(bits.v[3])));
         if (bits.v[0] >> 30) return 2 - 2 * first;
         return bits.v[0] & 0x20000000u ? Real(1 - largest) : Real(1 + largest);
     }
@@ -66,44 +99,8 @@ constexpr PhaseFamily kPhases[] = {{"isotropic", PHASE_ISOTROPIC, 1, 1},
                                    {"henyey-greenstein, |g| to 0.99", PHASE_HENYEY_GREENSTEIN, 0.01, 1},
                                    {"henyey-greenstein, |g| to 1 − 1e-6", PHASE_HENYEY_GREENSTEIN, 1e-6, 0.01}};
 
-glm::dvec3 some_direction(StressRandom& random) {
-    if (random.below(4) == 0) {  // axes, with signed zeros, and next to them
-        glm::dvec3 d(random.below(2) ? 0.0 : -0.0);
-        const int axis = random.below(3);
-        d[axis] = random.sign();
-        if (random.below(2)) d[(axis + 1) % 3] = random.sign() * random.spread(1e-12, 1e-3);
-        return d / glm::length(d);
-    }
-    return glm::normalize(glm::dvec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)));
-}
-
-/// Any words, with those next to 0 and 2^32 often.
-StressBits some_bits(StressRandom& random) {
-    StressBits b;
-    for (auto& w : b.v) {
-        const int kind = random.below(6);
-        w = kind == 0 ? static_cast<std::uint32_t>(random.below(3)) : kind == 1 ? 0xffffffffu - static_cast<std::uint32_t>(random.below(3)) : kind == 2 ? random.word() >> random.below(32) : random.word();
-    }
-    return b;
-}
-
-device::float4 pack(const glm::dvec3& v, double w) { return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(w)}; }
-Vector exact(const device::float4& v) { return oracle::vector(&v.x); }
-
-StressError error_of(const Real& off, bool finite, const std::string& at) {
-    StressError e;
-    e.nonfinite = !finite;
-    e.error = finite ? num(off) : INFINITY;
-    e.at = at;
-    return e;
-}
-
-bool finite(std::initializer_list<float> values) {
-    return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
-}
-
 void stress_phases(StressDevice& device, const StressOptions& options, StressResult& result) {
-    const Limit value_limit = stated_limit("phase.cl", "phase_value"), direction_limit = stated_limit("phase.cl", "phase_sample", "direction"), pdf_limit = stated_limit("phase.cl", "phase_sample", "pdf");
+    const Limit value_limit = stated_limit("phase_body.inc.cl", "FN(phase_value)"), direction_limit = stated_limit("phase_body.inc.cl", "FN(phase_sample)", "direction"), pdf_limit = stated_limit("phase_body.inc.cl", "FN(phase_sample)", "pdf");
     const std::size_t n = options.quick ? 500 : 20000;
     StressRandom random(31);
     for (const PhaseFamily& f : kPhases) {
@@ -123,179 +120,21 @@ void stress_phases(StressDevice& device, const StressOptions& options, StressRes
                 // The device is told 1 − c for g >= 0, 1 + c for g < 0: the side of the peak.
                 values[i] = compare_to(static_cast<double>(got.values[i]), phase_value(f.kind, abs(g), given), value_limit.unit);
                 const Vector d = oracle::unit(exact(directions[i])), axis{Real(0), Real(0), Real(1)};
-                const Real versine = phase_versine(f.kind, g, bits[i]), turn = uniform(bits[i].v[1]);
+                const Real versine = phase_versine(f.kind, g, bits[i]), turn = stress_uniform(bits[i].v[1]);
                 // An isotropic direction does not turn with d; its frame is that of sphere_uniform: x by cosine, y by sine.
                 const Vector truth = around(f.kind == PHASE_ISOTROPIC ? axis : d, versine, turn);
                 const device::float4& s = got.directions[i];
                 const std::string at = fmt::format("g {:.9g}, d ({:.9g}, {:.9g}, {:.9g}), bits {:08x} {:08x} {:08x} {:08x}, 1 - c {:.9g}: ({:.9g}, {:.9g}, {:.9g}), pdf {:.9g}, value {:.9g}", directions[i].w, directions[i].x,
                                                    directions[i].y, directions[i].z, bits[i].v[0], bits[i].v[1], bits[i].v[2], bits[i].v[3], versines[i], s.x, s.y, s.z, s.w, got.values[i]);
-                const bool ok = finite({s.x, s.y, s.z, s.w});
+                const bool ok = all_finite({s.x, s.y, s.z, s.w});
                 sampled[i] = error_of(ok ? oracle::distance(exact(s), truth) : Real(0), ok, at);
                 pdfs[i] = compare_to(static_cast<double>(s.w), phase_value(f.kind, g, versine), pdf_limit.unit);
                 values[i].at = pdfs[i].at = at;
             }
         });
-        result.rows.push_back(stress_row("phase function", "phase_value", f.name, value_limit, values, options));
-        result.rows.push_back(stress_row("phase sampling: direction", "phase_sample", f.name, direction_limit, sampled, options));
-        result.rows.push_back(stress_row("phase sampling: density", "phase_sample", f.name, pdf_limit, pdfs, options));
-    }
-}
-
-struct LightFamily {
-    const char* name;
-    LightKind kind;
-    double size[2], distance[2];  ///< of the light, and from it to the point, normalised lengths
-    bool in_radii = false;        ///< the distance is in radii of the sphere
-};
-constexpr LightFamily kLights[] = {{"constant", LightKind::constant, {1, 1}, {1, 1}},
-                                   {"directional", LightKind::directional, {1, 1}, {1, 1}},
-                                   {"point", LightKind::point, {1, 1}, {1e-6, 1e6}},
-                                   {"spot", LightKind::spot, {1, 1}, {1e-3, 1e3}},
-                                   {"sphere", LightKind::sphere, {0.01, 1}, {0.1, 3}},
-                                   {"sphere, small and far", LightKind::sphere, {1e-7, 1e-3}, {0.3, 1.5}},
-                                   {"sphere, next to it", LightKind::sphere, {0.1, 1}, {0.01, 0.05}, true},
-                                   {"rectangle", LightKind::rectangle, {0.01, 1}, {0.05, 1.5}},
-                                   {"rectangle, small and far", LightKind::rectangle, {1e-7, 1e-3}, {0.3, 1.5}}};
-
-/// A light of the family in a scene of radius about 1.
-Light make_light(const LightFamily& f, StressRandom& random, double size) {
-    Light l;
-    l.kind = f.kind;
-    l.radiance = l.intensity = l.irradiance = glm::dvec3(random.spread(1e-3, 1e3));
-    const glm::dvec3 place = 0.2 * glm::dvec3(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
-    l.position = l.center = l.corner = place;
-    l.direction = some_direction(random);
-    l.target = place + some_direction(random);
-    l.beam_rad = 0.3, l.cutoff_rad = 2.9;
-    l.radius = size;
-    l.edge_u = size * glm::normalize(glm::dvec3(1, random.uniform(-1, 1), 0.1));
-    l.edge_v = size * random.uniform(0.3, 1) * glm::normalize(glm::dvec3(random.uniform(-0.3, 0.3), 0.2, 1));
-    return l;
-}
-
-/// The exact sample for the same bits.
-struct LightTruth {
-    Vector direction, end;
-    Real pdf = 0, value = 0;
-    Real weight = 1;  ///< of relative errors: a spot's falloff, the cosine at a rectangle
-    bool lit = true;
-};
-
-LightTruth light_truth(const device::LightInfo& l, const Vector& o, const StressBits& bits) {
-    LightTruth s;
-    const Real pi = oracle::pi(), radiance = static_cast<double>(l.radiance.x), select = static_cast<double>(l.select_pdf);
-    const Vector position = exact(l.position);
-    const Vector v{position[0] - o[0], position[1] - o[1], position[2] - o[2]};
-    const Real u = uniform(bits.v[1]), turn = uniform(bits.v[2]), q2 = oracle::dot(v, v);
-    switch (l.kind) {
-        case LIGHT_CONSTANT:
-            s.direction = around({Real(0), Real(0), Real(1)}, 2 * u, turn);
-            s.pdf = select / (4 * pi);
-            s.value = radiance / s.pdf;
-            break;
-        case LIGHT_DIRECTIONAL:
-            s.direction = {-position[0], -position[1], -position[2]};
-            s.value = radiance / select;
-            break;
-        case LIGHT_POINT:
-        case LIGHT_SPOT: {
-            s.direction = oracle::unit(v);
-            s.end = position;
-            s.value = radiance / q2 / select;
-            if (l.kind == LIGHT_POINT) break;
-            const Vector axis = oracle::unit(exact(l.axis));
-            const Real angle = acos(-oracle::dot(s.direction, axis));
-            s.weight = std::min(Real(1), Real((Real(static_cast<double>(l.axis.w)) - angle) * Real(static_cast<double>(l.edge_u.x))));
-            s.lit = s.weight > 0;
-            s.value *= s.weight;
-            break;
-        }
-        case LIGHT_SPHERE: {
-            const Real r = static_cast<double>(l.position.w), sin2 = r * r / q2;
-            if (!(sin2 < 1)) return s.lit = false, s;
-            const Real cap = sin2 / (1 + sqrt(1 - sin2));
-            s.direction = around(oracle::unit(v), u * cap, turn);
-            s.pdf = select / (2 * pi * cap);
-            s.value = radiance / s.pdf;
-            break;
-        }
-        default: {
-            const Vector eu = exact(l.edge_u), ev = exact(l.edge_v), n = exact(l.axis);
-            for (std::size_t k = 0; k < 3; ++k) s.end[k] = position[k] + u * eu[k] + turn * ev[k];
-            const Vector to{s.end[0] - o[0], s.end[1] - o[1], s.end[2] - o[2]};
-            s.direction = oracle::unit(to);
-            const Real cosine = -oracle::dot(s.direction, n);
-            s.lit = cosine > 0;
-            s.weight = cosine;
-            s.pdf = select * oracle::dot(to, to) / (cosine * Real(static_cast<double>(l.position.w)));
-            s.value = radiance / s.pdf;
-            break;
-        }
-    }
-    return s;
-}
-
-void stress_lights(StressDevice& device, const StressOptions& options, StressResult& result) {
-    const Limit direction_limit = stated_limit("light.cl", "light_sample", "direction"), end_limit = stated_limit("light.cl", "light_sample", "end"), pdf_limit = stated_limit("light.cl", "light_sample", "pdf"),
-                value_limit = stated_limit("light.cl", "light_sample", "value");
-    const std::size_t n = options.quick ? 60 : 1500, scenes = options.quick ? 4 : 12;
-    StressRandom random(41);
-    for (const LightFamily& f : kLights) {
-        std::vector<StressError> directions, ends, pdfs, values;
-        std::size_t lost = 0, invented = 0, cases = 0;
-        for (std::size_t part = 0; part < scenes; ++part) {
-            Scene scene;
-            scene.camera.origin = {0, 0, 5};
-            scene.render.light_sampling = LightSampling::nee;
-            scene.render.strategy = "decomposition";
-            EllipsoidMedium& medium = scene.media.emplace_back();
-            Primitive ball;
-            ball.center = {0, 0, 0}, ball.axes = glm::dmat3(0.4), ball.sigma_t = 1;
-            medium.primitives.push_back(ball);
-            const double size = random.spread(f.size[0], f.size[1]);
-            scene.lights.push_back(make_light(f, random, size));
-            const DeviceScene packed = make_device_scene(scene, {});
-            const device::LightInfo& light = packed.lights[0];
-            std::vector<device::float4> points(n);
-            std::vector<StressBits> bits(2 * n);
-            const glm::dvec3 at(light.position.x, light.position.y, light.position.z);
-            for (std::size_t i = 0; i < n; ++i) {
-                const double gap = random.spread(f.distance[0], f.distance[1]);
-                const double radius = f.kind == LightKind::sphere ? static_cast<double>(light.position.w) : 0, away = f.in_radii ? radius * (1 + gap) : radius + gap;
-                points[i] = pack(f.kind == LightKind::constant || f.kind == LightKind::directional ? glm::dvec3(0) : at + away * some_direction(random), 0);
-                bits[2 * i] = some_bits(random), bits[2 * i + 1] = some_bits(random);
-            }
-            const auto got = device.lights(packed, points, bits);
-            for (std::size_t i = 0; i < n; ++i) {
-                const LightTruth truth = light_truth(light, exact(points[i]), bits[2 * i]);
-                const auto& s = got[i];
-                const bool lit = s.lit > 0;
-                ++cases;
-                lost += truth.lit && !lit, invented += !truth.lit && lit;
-                if (!truth.lit || !lit) continue;
-                const std::string where = fmt::format("light at ({:.9g}, {:.9g}, {:.9g}) size {:.9g}, point ({:.9g}, {:.9g}, {:.9g}), bits {:08x} {:08x}: direction ({:.9g}, {:.9g}, {:.9g}), t {:.9g}, pdf {:.9g}, value {:.9g}", light.position.x,
-                                                      light.position.y, light.position.z, light.position.w, points[i].x, points[i].y, points[i].z, bits[2 * i].v[1], bits[2 * i].v[2], s.direction[0], s.direction[1], s.direction[2],
-                                                      s.distance, s.pdf, s.value);
-                const bool ok = finite({s.direction[0], s.direction[1], s.direction[2], s.distance, s.value, s.pdf});
-                const Vector direction = oracle::vector(s.direction);
-                directions.push_back(error_of(ok ? oracle::distance(direction, truth.direction) : Real(0), ok, where));
-                if (truth.pdf > 0) pdfs.push_back(compare_to(static_cast<double>(s.pdf), truth.pdf, pdf_limit.unit)), pdfs.back().at = where, pdfs.back().error *= std::min(1.0, num(truth.weight));
-                values.push_back(compare_to(static_cast<double>(s.value), truth.value, value_limit.unit));
-                values.back().error *= std::min(1.0, num(truth.weight));
-                values.back().at = where;
-                if (f.kind == LightKind::constant || f.kind == LightKind::directional || !ok) continue;
-                const Vector end = oracle::along(exact(points[i]), direction, Real(static_cast<double>(s.distance)));
-                const Real off = f.kind == LightKind::sphere ? Real(abs(oracle::distance(end, exact(light.position)) - Real(static_cast<double>(light.position.w)))) : oracle::distance(end, truth.end);
-                // In ulp of the radius, or of the distance where that is greater.
-                ends.push_back(error_of(off / std::max(1.0, static_cast<double>(s.distance)) * Real(0x1p23), true, where));
-            }
-        }
-        StressRow row = stress_row("light sampling: direction", "light_sample", f.name, direction_limit, directions, options);
-        row.lost = {lost, cases, ""}, row.invented = {invented, cases, ""};
-        result.rows.push_back(row);
-        if (!ends.empty()) result.rows.push_back(stress_row("light sampling: end", "light_sample", f.name, end_limit, ends, options));
-        if (!pdfs.empty()) result.rows.push_back(stress_row("light sampling: density", "light_sample", f.name, pdf_limit, pdfs, options));
-        result.rows.push_back(stress_row("light sampling: value", "light_sample", f.name, value_limit, values, options));
+        result.rows.push_back(stress_row("phase function", "FN(phase_value)", f.name, value_limit, values, options));
+        result.rows.push_back(stress_row("phase sampling: direction", "FN(phase_sample)", f.name, direction_limit, sampled, options));
+        result.rows.push_back(stress_row("phase sampling: density", "FN(phase_sample)", f.name, pdf_limit, pdfs, options));
     }
 }
 
@@ -341,7 +180,7 @@ void stress_cameras(StressDevice& device, const StressOptions& options, StressRe
             std::vector<StressDevice::FilmPoint> points(n);
             for (auto& p : points) {
                 p.x = static_cast<std::uint32_t>(random.below(scene.film.width)), p.y = static_cast<std::uint32_t>(random.below(scene.film.height));
-                p.u = static_cast<float>(num(uniform(some_bits(random).v[0]))), p.v = static_cast<float>(num(uniform(some_bits(random).v[0])));
+                p.u = static_cast<float>(num(stress_uniform(some_bits(random).v[0]))), p.v = static_cast<float>(num(stress_uniform(some_bits(random).v[0])));
             }
             const auto got = device.camera(packed, points);
             const device::RenderParams& p = packed.params;
@@ -370,7 +209,7 @@ void stress_cameras(StressDevice& device, const StressOptions& options, StressRe
                 const ProbeRay& r = got[i];
                 const std::string at = fmt::format("eye {:.3g} radii away, film point ({} + {:.9g}, {} + {:.9g}): o ({:.9g}, {:.9g}, {:.9g}), d ({:.9g}, {:.9g}, {:.9g})", away, points[i].x, points[i].u, points[i].y, points[i].v,
                                                    r.origin[0], r.origin[1], r.origin[2], r.direction[0], r.direction[1], r.direction[2]);
-                const bool ok = finite({r.origin[0], r.origin[1], r.origin[2], r.direction[0], r.direction[1], r.direction[2]});
+                const bool ok = all_finite({r.origin[0], r.origin[1], r.origin[2], r.direction[0], r.direction[1], r.direction[2]});
                 const Real ulps = Real(0x1p23) / std::max(Real(1), Real(sqrt(oracle::dot(o, o))));  // of the radius, or of the place where that is farther out
                 StressError origin = error_of(oracle::distance(oracle::vector(r.origin), o) * ulps, ok, at), direction = error_of(oracle::distance(oracle::vector(r.direction), d), ok, at);
                 const Vector between{o[0] - scene_o[0], o[1] - scene_o[1], o[2] - scene_o[2]};
@@ -389,9 +228,7 @@ void stress_cameras(StressDevice& device, const StressOptions& options, StressRe
 
 void stress_sampling(StressDevice& device, const StressOptions& options, StressResult& result, const PartProgress& progress) {
     stress_phases(device, options, result);
-    progress(0.4);
-    stress_lights(device, options, result);
-    progress(0.8);
+    progress(0.5);
     stress_cameras(device, options, result);
     progress(1);
 }

@@ -67,7 +67,7 @@ TEST_CASE("Kernels.LintIsClean") {
     const int width = GENERATE(16, 8, 4, 1), strategy = GENERATE(1, 2, 3, 4, 5, 6, 7), accelerator = GENERATE(1, 2);
     const std::string defines = "-DCLUME_WIDTH=" + std::to_string(width) + " -DCLUME_STRATEGY=" + std::to_string(strategy) +
                                 " -DCLUME_ACCEL=" + std::to_string(accelerator) + " -DCLUME_TRANSMITTANCE=" + std::to_string(1 + strategy % 5) +
-                                " -DCLUME_COUNT=" + std::to_string(strategy % 2) + " -DCLUME_SCENE_BOUND=" + std::to_string(accelerator - 1);
+                                " -DCLUME_COUNT=" + std::to_string(strategy % 2) + " -DCLUME_LANES=" + std::to_string(strategy == 2) + " -DCLUME_SCENE_BOUND=" + std::to_string(accelerator - 1);
     for (const std::string& root : roots) {
         const LintResult result = lint(clume::assemble_source(root), defines);
         INFO(root << " " << defines << "\n" << result.output);

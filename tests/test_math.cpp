@@ -188,7 +188,7 @@ TEST_CASE("Math.Trigonometry", "[kernels][quick]") {
     auto turns = evenly_spaced(0.0f, 1.0f, 20000, 18);
     for (const float v : log_spaced(1e-30f, 1.0f, 4000, 19)) turns.push_back(v);
     for (int k = 0; k <= 8; ++k) turns.push_back(static_cast<float>(k) / 8);
-    const Limit sincos = stated_limit("math.cl", "sincos_turns_s");
+    const Limit sincos = stated_limit("math_body.inc.cl", "FN(sincos_turns)");
     check("sin of turns", MathFunction::sin_turns, sincos, turns, {}, [](float a, float) { return high::sin(2 * high::pi() * Real(a)); });
     check("cos of turns", MathFunction::cos_turns, sincos, turns, {}, [](float a, float) { return high::cos(2 * high::pi() * Real(a)); });
     auto x = evenly_spaced(-1.0f, 1.0f, 20000, 20);
@@ -209,7 +209,7 @@ TEST_CASE("Math.UniformIsOpen", "[kernels][quick]") {
     TestRandom random(25);
     for (int i = 0; i < 20000; ++i) x.push_back(from_bits(random.word()));
     const auto u = bare_probe(16).math(MathFunction::uniform, x);
-    const double limit = stated_limit("rng.cl", "uniform_s").value;
+    const double limit = stated_limit("rng_body.inc.cl", "FN(uniform)").value;
     for (std::size_t i = 0; i < x.size(); ++i) {
         INFO("bits " << bits(x[i]) << " give " << u[i]);
         const double exact = (static_cast<double>(bits(x[i])) + 0.5) * 0x1p-32;

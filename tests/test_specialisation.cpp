@@ -32,7 +32,7 @@ device::float4 row(const glm::dvec3& v, float w) {
 DeviceScene generalised(const Scene& scene, DeviceScene device) {
     std::vector<std::pair<std::string, std::string>> kept;
     for (const auto& define : device.defines)
-        for (const char* name : {"CLUME_STRATEGY", "CLUME_ACCEL", "CLUME_BVH_STACK", "CLUME_NEE", "CLUME_HITS"})
+        for (const char* name : {"CLUME_STRATEGY", "CLUME_ACCEL", "CLUME_BVH_STACK", "CLUME_NEE", "CLUME_HITS", "CLUME_LANES"})
             if (define.first == name) kept.push_back(define);
     device.defines = kept;
     device.shading.clear();

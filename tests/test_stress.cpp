@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `clume stress` itself: the device holds every limit that the kernels state; a wrong kernel and a wrong limit are found; the
 // 256-bit oracle agrees with quadrature and with the tests' own; limits are read from comments; what the report writes.
+#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <fmt/format.h>
@@ -9,6 +10,7 @@
 #include <sstream>
 
 #include "src/stress.h"
+#include "src/stress_lines.h"
 #include "src/stress_oracle.h"
 #include "src/stress_parts.h"
 #include "src/stress_report.h"
@@ -28,10 +30,12 @@ const StressResult& quick_result() {
     return result;
 }
 
-StressResult chords_alone(const StressOptions& options) {
+/// One part of it, such as stress_chords.
+template <class Part>
+StressResult alone(Part part, const StressOptions& options) {
     StressDevice device(test_device());
     StressResult result;
-    stress_chords(device, options, result, [](double) {});
+    part(device, options, result, [](double) {});
     return result;
 }
 
@@ -59,27 +63,66 @@ TEST_CASE("Stress.EveryLimitHolds", "[kernels][quick]") {
         CHECK(r.limit.value > 0);
         functions.insert(r.function);
     }
-    for (const char* name : {"FN(rcp)", "FN(divide)", "FN(rsqrt)", "FN(sqrt)", "FN(exp)", "FN(log)", "FN(exponential)", "FN(erfc)", "FN(erfc_inverse)", "FN(epanechnikov_inverse)", "sincos_turns_s", "asin_s", "acos_s",
-                             "atan2_s", "normalize_s", "uniform_s", "erf_between", "intersect", "intersect_quadratic", "density_part", "depth_part", "flight_part", "transmittance_analytic", "phase_value", "phase_sample",
-                             "light_sample", "camera_ray"})
+    for (const char* name : {"FN(rcp)", "FN(divide)", "FN(rsqrt)", "FN(sqrt)", "FN(exp)", "FN(log)", "FN(exponential)", "FN(erfc)", "FN(erfc_inverse)", "FN(epanechnikov_inverse)", "FN(sincos_turns)", "asin_s", "acos_s",
+                             "atan2_s", "normalize_s", "FN(uniform)", "erf_between", "intersect", "intersect_quadratic", "density_part", "depth_part", "flight_part", "transmittance_analytic", "FN(phase_value)", "FN(phase_sample)",
+                             "light_sample", "envmap_sample", "envmap_texel", "camera_ray"})
         CHECK(functions.count(name) == 1);
 }
 
 TEST_CASE("Stress.WrongFormulasAreFound", "[kernels][quick]") {
     // The textbook's formulas judged as if they were the kernels': each must break its limit in several families.
-    const StressResult result = chords_alone({.quick = true, .naive = true});
+    const StressResult result = alone(stress_chords, {.quick = true, .naive = true});
     CHECK_FALSE(result.holds());
     CHECK(exceeded(result, "intersect") > 3);
     CHECK(exceeded(result, "depth_part") > 3);
     CHECK(exceeded(result, "flight_part") > 3);
+    // Where the line lies is not theirs to get wrong: the integral and its inversion are.
+    const StressResult given = alone(stress_given, {.quick = true, .naive = true});
+    CHECK(exceeded(given, "depth_part") > 3);
+    CHECK(exceeded(given, "flight_part") > 3);
 }
 
 TEST_CASE("Stress.TooStrictLimitsAreFound", "[kernels][quick]") {
     // No float chord is within a thousandth of an ulp: a check that reads the wrong column would not notice.
-    const StressResult result = chords_alone({.quick = true, .strictness = 4000});
+    const StressResult result = alone(stress_chords, {.quick = true, .strictness = 4000});
     std::size_t rows = 0;
     for (const StressRow& r : result.rows) rows += r.function == "intersect";
     CHECK(exceeded(result, "intersect") == rows);
+    const StressResult images = alone(stress_environment, {.quick = true, .strictness = 4000});
+    CHECK(exceeded(images, "envmap_sample") >= 10);
+    CHECK(exceeded(images, "light_sample") >= 10);
+    const StressResult lights = alone(stress_lights, {.quick = true, .strictness = 4000});
+    CHECK(exceeded(lights, "light_sample") > 25);
+}
+
+TEST_CASE("Stress.InversionErrorsShowInTheDevicesGeometry", "[quick]") {
+    // A small Gaussian from within: a flight off by 1e-5 of its depth is hidden by what a line may move, not by what t may.
+    oracle::Ellipsoid256 e;
+    e.family = KernelFamily::gaussian, e.sigma = 1000, e.e2 = 9, e.mu = oracle::vector(std::array{0.5, 0.0, 0.0}.data());
+    e.w = {1000, 0, 0, 1000, 0, 1000};
+    const oracle::Line256 line(e, oracle::vector(std::array{0.4995, 0.0005, 0.0}.data()), oracle::vector(std::array{1.0, 0.0, 0.0}.data()));
+    const oracle::Line256 given(e, line.t_perp, line.w, line.distance * line.distance);
+    const oracle::Real tau = 0.3;
+    const double exact = static_cast<double>(line.invert(0, tau)), limit = stated_limit("ellipsoid.cl", "flight_part", "geometry").value, off = exact * (1 + 1e-5);
+    const double moved = stated_limit("ellipsoid.cl", "intersect").value * 0x1p-23, reach = static_cast<double>(abs(given.t_perp) + given.reach());
+    double relative = NAN;
+    CHECK(flight_error(line, 0, tau, off, moved, relative).error == 0);
+    CHECK(relative > 2 * limit);
+    CHECK(flight_error(given, 0, tau, off, 0x1p-23 * reach, relative).error > 2 * limit);
+    CHECK(flight_error(given, 0, tau, exact, 0x1p-23 * reach, relative).error == 0);
+}
+
+TEST_CASE("Stress.LightsTellWhatRoundingTheSceneDoes", "[kernels][quick]") {
+    for (const StressRow& r : quick_result().rows) {
+        if (!r.quantity.starts_with("light sampling") && !r.quantity.starts_with("environment image")) continue;
+        INFO(r.quantity << ", " << r.family << ": " << r.rounding.worst);
+        CHECK_FALSE(std::isnan(r.rounding.worst));
+        // The scene's numbers are rounded by half an ulp: what is well placed moves by no more than a few, and by something.
+        if (r.family == "point" || r.family == "sphere" || r.family == "spot" || r.family == "rectangle") {
+            CHECK(r.rounding.worst > 0);
+            if (r.quantity.ends_with("end")) CHECK(r.rounding.worst < 3);
+        }
+    }
 }
 
 TEST_CASE("Stress.RowsTellWhatIsWrong", "[quick]") {
@@ -136,6 +179,10 @@ TEST_CASE("Stress.OracleAgreesWithQuadrature", "[quick]") {
             const double t0 = t_in + (t_out - t_in) * random.uniform(-0.2, 0.9), t1 = t0 + (t_out - t_in) * random.uniform(0.1, 1);
             const double whole = static_cast<double>(chord.optical_depth_quadrature(t0, t1)), got = static_cast<double>(line.depth(t0, t1));
             CHECK(got == Approx(whole).epsilon(1e-14));
+            const oracle::Line256 given(e, line.t_perp, line.w, line.distance * line.distance);
+            CHECK(abs(given.depth(t0, t1) - line.depth(t0, t1)) <= line.depth(t0, t1) * oracle::Real(1e-60));
+            const oracle::Real begin = std::max(t0, t_in), end = std::min(t1, t_out);  // as the device gives them
+            for (const double along : {-0.9e-9, 0.9e-9}) CHECK(given.depth_near(begin, end, 1e-9).outside(line.depth(begin + along, end + along), line.depth(begin, end)) < 1e-60);
             const auto range = line.depth_near(t0, t1, 1e-9);
             CHECK(range.outside(line.depth(t0, t1), line.depth(t0, t1)) < 1e-60);
             for (int axis = 0; axis < 3; ++axis)

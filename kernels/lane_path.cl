@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: MIT
+// CLUME_WIDTH paths side by side: path.cl, lane by lane, with the same results to the bit. What meets lights goes lane by lane
+// through path.cl's own functions; the rest is done for all lanes at once.
+#include "lane_flight.cl"
+#include "path.cl"
+
+#if CLUME_LANES
+
+// Shadow rays that are flights, too, are flown side by side with the others: lanes stay full.
+#define LANE_SHADOWS (CLUME_NEE && CLUME_TRANSMITTANCE == TRANSMITTANCE_BINARY)
+
+typedef struct {
+    LaneFlights flight;
+    LaneDraws draws;
+    vfloat beta[CLUME_CHANNELS], radiance[CLUME_CHANNELS];
+    vfloat phase_pdf;
+    vfloat t_surface;         // where the ray ends
+    vuint surface;            // on which light (NO_LIGHT: none)
+    vuint row;                // of the work-item's sums
+    vfloat film_x, film_y;    // lower corner of the pixel, from the scene's centre
+    vint alive, alpha;        // masks
+    vint under_way, result;   // of the flights
+#if LANE_SHADOWS
+    vint shadow;                     // mask: the flight is a shadow ray's
+    vfloat light[CLUME_CHANNELS];    // what it adds if it gets through
+    vfloat next_x, next_y, next_z;   // direction that the path takes afterwards
+#endif
+    uint violations;
+    ulong excess;
+} Lanes;
+
+#define LANE_OF(type, v, i) (((const type*)&(v))[i])
+#if CLUME_CHANNELS == 1
+#define LANE_SPECTRUM(v, i) (((const float*)&(v)[0])[i])
+#define LANE_CHANNEL(s, c) (s)
+#define PARAM_CHANNEL(p, c) ((p).x)
+#else
+#define LANE_SPECTRUM(v, i) (float3)(((const float*)&(v)[0])[i], ((const float*)&(v)[1])[i], ((const float*)&(v)[2])[i])
+#define LANE_CHANNEL(s, c) (((const float*)&(s))[c])
+#define PARAM_CHANNEL(p, c) ((c) == 0 ? (p).x : (c) == 1 ? (p).y : (p).z)
+#endif
+
+static float3 lane_origin(const LaneFlights* f, int i) { return (float3)(LANE_OF(float, f->ox, i), LANE_OF(float, f->oy, i), LANE_OF(float, f->oz, i)); }
+static float3 lane_direction(const LaneFlights* f, int i) { return (float3)(LANE_OF(float, f->dx, i), LANE_OF(float, f->dy, i), LANE_OF(float, f->dz, i)); }
+
+static void lane_add(vfloat* radiance, int i, spectrum s) {
+    for (int c = 0; c < CLUME_CHANNELS; ++c) ((float*)(radiance + c))[i] += LANE_CHANNEL(s, c);
+}
+
+/// path_begin of the lanes in `mask`, whose sample and pixel are set.
+static void lanes_start(Lanes* l, vint mask, __constant const RenderParams* params) {
+    vuint a, b, c, d;
+    LANE_SET(l->draws.depth, (vuint)0u, mask);
+    lanes_bits(&l->draws, (vuint)DRAW_CAMERA, &a, &b, &c, &d);
+    const vfloat fx = l->film_x + uniform_v(a), fy = l->film_y + uniform_v(b);
+    LaneFlights* f = &l->flight;
+    LANE_SET(f->ox, fma(fx, (vfloat)params->plane_x.x, fma(fy, (vfloat)params->plane_y.x, (vfloat)params->plane_c.x)), mask);
+    LANE_SET(f->oy, fma(fx, (vfloat)params->plane_x.y, fma(fy, (vfloat)params->plane_y.y, (vfloat)params->plane_c.y)), mask);
+    LANE_SET(f->oz, fma(fx, (vfloat)params->plane_x.z, fma(fy, (vfloat)params->plane_y.z, (vfloat)params->plane_c.z)), mask);
+    vfloat dx = fma(fx, (vfloat)params->dir_x.x, fma(fy, (vfloat)params->dir_y.x, (vfloat)params->dir_c.x));
+    vfloat dy = fma(fx, (vfloat)params->dir_x.y, fma(fy, (vfloat)params->dir_y.y, (vfloat)params->dir_c.y));
+    vfloat dz = fma(fx, (vfloat)params->dir_x.z, fma(fy, (vfloat)params->dir_y.z, (vfloat)params->dir_c.z));
+    normalize3_v(&dx, &dy, &dz);
+    LANE_SET(f->dx, dx, mask);
+    LANE_SET(f->dy, dy, mask);
+    LANE_SET(f->dz, dz, mask);
+    LANE_SET(f->t, (vfloat)0.0f, mask);
+    LANE_SET(f->draw, (vuint)0u, mask);
+    for (int k = 0; k < CLUME_CHANNELS; ++k) {
+        LANE_SET(l->beta[k], (vfloat)1.0f, mask);
+        LANE_SET(l->radiance[k], (vfloat)0.0f, mask);
+    }
+    LANE_SET(l->phase_pdf, (vfloat)0.0f, mask);
+    l->alive |= mask;
+    l->alpha &= ~mask;
+}
+
+/// Begins the flights of the lanes in `mask`.
+static void lanes_depart(Lanes* l, vint mask, __constant const RenderParams* params, __global const CellEntry* cells, __global const LightInfo* lights) {
+    vint path = mask;
+#if LANE_SHADOWS
+    path &= ~l->shadow;  // a shadow ray knows its end
+#endif
+    LANE_SET(l->t_surface, (vfloat)CLUME_INFINITY, path);
+#if LIGHT_SURFACES
+    for (int i = 0; i < CLUME_WIDTH; ++i)
+        if (LANE_OF(int, path, i))
+            ((float*)&l->t_surface)[i] = surfaces_nearest(lane_origin(&l->flight, i), lane_direction(&l->flight, i), CLUME_INFINITY, NO_LIGHT, (uint*)&l->surface + i, params, lights);
+#endif
+    const vint under_way = lanes_begin(&l->flight, l->t_surface, &l->draws, mask, params, cells);
+    LANE_SET(l->result, (vint)FLIGHT_ESCAPED, mask & ~under_way);
+    l->under_way |= under_way;
+}
+
+#if LIGHT_ENVIRONMENTS == LIGHT_CONSTANT
+/// environment_radiance of constant environments, for the lanes in `mask`.
+static void lanes_environment(Lanes* l, vint mask, __constant const RenderParams* params, __global const LightInfo* lights) {
+    const vint camera = l->draws.depth == (vuint)0u;
+    vfloat sum[CLUME_CHANNELS];
+    for (int k = 0; k < CLUME_CHANNELS; ++k) sum[k] = (vfloat)0.0f;
+    for (uint i = 0; i < params->light_count; ++i) {
+        const uint kind = lights[i].kind;
+        if (kind != LIGHT_CONSTANT) continue;
+        const vint counts = vselect((vint)((kind & CLUME_HITS) ? -1 : 0), (vint)(lights[i].visible ? -1 : 0), camera);
+        const float other = (kind & CLUME_NEE) ? lights[i].select_pdf * CLUME_INV_4PI : 0.0f;
+        const vfloat weight = vselect(divide_v(l->phase_pdf, l->phase_pdf + other), (vfloat)1.0f, camera);
+        for (int k = 0; k < CLUME_CHANNELS; ++k) LANE_SET(sum[k], sum[k] + PARAM_CHANNEL(lights[i].radiance, k) * weight, counts);
+    }
+    for (int k = 0; k < CLUME_CHANNELS; ++k) LANE_SET(l->radiance[k], l->radiance[k] + l->beta[k] * sum[k], mask);
+}
+#endif
+
+/// What the paths that escape find; they end.
+static void lanes_escape(Lanes* l, vint mask, SCENE_ARGS) {
+    vint missing = mask;
+#if LIGHT_SURFACES
+    missing &= l->surface == (vuint)NO_LIGHT;
+    l->alpha |= mask & ~missing & (l->draws.depth == (vuint)0u);
+#endif
+#if LIGHT_ENVIRONMENTS == LIGHT_CONSTANT
+    if (vany(missing)) lanes_environment(l, missing, params, lights);
+#endif
+#if LIGHT_SURFACES || (CLUME_LIGHTS & LIGHT_ENVMAP)
+    for (int i = 0; i < CLUME_WIDTH; ++i) {
+        if (!LANE_OF(int, mask, i)) continue;
+        const float3 d = lane_direction(&l->flight, i);
+        const uint depth = LANE_OF(uint, l->draws.depth, i);
+        const float phase_pdf = LANE_OF(float, l->phase_pdf, i);
+#if LIGHT_SURFACES
+        if (LANE_OF(uint, l->surface, i) != NO_LIGHT) {
+            lane_add(l->radiance, i, LANE_SPECTRUM(l->beta, i) * path_surface(LANE_OF(uint, l->surface, i), lane_origin(&l->flight, i), d, LANE_OF(float, l->t_surface, i), phase_pdf, depth, lights));
+            continue;
+        }
+#endif
+#if CLUME_LIGHTS & LIGHT_ENVMAP
+        lane_add(l->radiance, i, LANE_SPECTRUM(l->beta, i) * path_background(d, phase_pdf, depth, params, lights, texels, alias));
+#endif
+    }
+#endif
+    l->alive &= ~mask;
+}
+
+/// The paths in `mask` go on from where they are, in a new direction.
+static void lanes_turn(Lanes* l, vfloat x, vfloat y, vfloat z, vint mask) {
+    LANE_SET(l->flight.dx, x, mask);
+    LANE_SET(l->flight.dy, y, mask);
+    LANE_SET(l->flight.dz, z, mask);
+    LANE_SET(l->draws.depth, l->draws.depth + 1u, mask);
+    LANE_SET(l->flight.draw, (vuint)0u, mask);
+}
+
+/// Scatters the paths of the lanes in `mask`, or ends them.
+static void lanes_collide(Lanes* l, vint mask, SCENE_ARGS) {
+    LaneFlights* f = &l->flight;
+    l->alpha |= mask & (l->draws.depth == (vuint)0u);
+    vuint phase = (vuint)CLUME_PHASES;
+    vfloat g = (vfloat)params->albedo.w, albedo[CLUME_CHANNELS], emission[CLUME_CHANNELS];
+    for (int k = 0; k < CLUME_CHANNELS; ++k) {
+        albedo[k] = (vfloat)PARAM_CHANNEL(params->albedo, k);
+        emission[k] = (vfloat)PARAM_CHANNEL(params->emission, k);
+    }
+#if CLUME_PER_PRIMITIVE
+    vuint row[4];
+    const vuint first = vselect((vuint)0u, 2u * f->primitive, mask);
+    lanes_load((__global const uint4*)shading, first, row, row + 1, row + 2, row + 3);
+#if !CLUME_UNIFORM_ALBEDO
+    for (int k = 0; k < CLUME_CHANNELS; ++k) albedo[k] = as_vfloat(row[k]);
+#endif
+#if !CLUME_UNIFORM_G
+    g = as_vfloat(row[3]);
+#endif
+#if CLUME_EMISSION == 2 || !CLUME_ONE_MEDIUM
+    lanes_load((__global const uint4*)shading, first + 1u, row, row + 1, row + 2, row + 3);
+#if CLUME_EMISSION == 2
+    for (int k = 0; k < CLUME_CHANNELS; ++k) emission[k] = as_vfloat(row[k]);
+#endif
+#if !CLUME_ONE_MEDIUM
+    for (int i = 0; i < CLUME_WIDTH; ++i)
+        if (LANE_OF(int, mask, i)) ((uint*)&phase)[i] = media[LANE_OF(uint, row[3], i)].phase;
+#endif
+#endif
+#endif
+#if CLUME_EMISSION
+    for (int k = 0; k < CLUME_CHANNELS; ++k) LANE_SET(l->radiance[k], l->radiance[k] + l->beta[k] * (1.0f - albedo[k]) * emission[k], mask);
+#endif
+    vint lives = mask;
+#if CLUME_DEPTH_LIMIT
+    lives &= l->draws.depth != (vuint)(uint)params->max_depth;
+#endif
+    vfloat most = (vfloat)0.0f;
+    for (int k = 0; k < CLUME_CHANNELS; ++k) {
+        LANE_SET(l->beta[k], l->beta[k] * albedo[k], lives);
+        most = max_v(most, l->beta[k]);
+    }
+    lives &= most > (vfloat)0.0f;
+    vuint a, b, c, d;
+    const vint roulette = lives & (as_vint(l->draws.depth) >= (vint)params->rr_depth) & (most < (vfloat)1.0f);
+    if (vany(roulette)) {
+        lanes_bits(&l->draws, (vuint)DRAW_ROULETTE, &a, &b, &c, &d);
+        lives &= ~(roulette & (uniform_v(a) >= most));
+        const vfloat gain = rcp_v(most);
+        for (int k = 0; k < CLUME_CHANNELS; ++k) LANE_SET(l->beta[k], l->beta[k] * gain, roulette & lives);
+    }
+    l->alive &= ~mask | lives;
+    if (!vany(lives)) return;
+    LANE_SET(f->ox, fma(f->t, f->dx, f->ox), lives);
+    LANE_SET(f->oy, fma(f->t, f->dy, f->oy), lives);
+    LANE_SET(f->oz, fma(f->t, f->dz, f->oz), lives);
+    lanes_bits(&l->draws, (vuint)DRAW_PHASE, &a, &b, &c, &d);
+    vfloat x = f->dx, y = f->dy, z = f->dz;
+    LANE_SET(l->phase_pdf, phase_sample_v(phase, g, a, b, c, d, &x, &y, &z), lives);
+    vint onward = lives;
+#if CLUME_NEE
+    for (int i = 0; i < CLUME_WIDTH; ++i) {
+        if (!LANE_OF(int, lives, i)) continue;
+        const Draws r = {LANE_OF(uint, l->draws.sample, i), LANE_OF(uint, l->draws.pixel, i), LANE_OF(uint, l->draws.depth, i), l->draws.seed};
+        LightSample s;
+        spectrum value;
+        uint word;
+        if (!path_light_sample(lane_origin(f, i), lane_direction(f, i), LANE_OF(uint, phase, i), LANE_OF(float, g, i), &r, &s, &value, &word, SCENE)) continue;
+#if LANE_SHADOWS
+        value *= LANE_SPECTRUM(l->beta, i);
+        for (int k = 0; k < CLUME_CHANNELS; ++k) ((float*)(l->light + k))[i] = LANE_CHANNEL(value, k);
+        ((float*)&f->dx)[i] = s.direction.x;
+        ((float*)&f->dy)[i] = s.direction.y;
+        ((float*)&f->dz)[i] = s.direction.z;
+        ((float*)&l->t_surface)[i] = s.distance;
+        ((int*)&onward)[i] = 0;
+#else
+        Flight flight;
+        flight.violations = l->violations;
+        flight.excess = l->excess;
+        value *= transmittance_estimate(lane_origin(f, i), s.direction, s.distance, word, &r, &flight, SCENE);
+        lane_add(l->radiance, i, LANE_SPECTRUM(l->beta, i) * value);
+        l->violations = flight.violations;
+        l->excess = flight.excess;
+#endif
+    }
+#endif
+    LANE_SET(f->t, (vfloat)0.0f, lives);
+#if LANE_SHADOWS
+    const vint shadow = lives & ~onward;
+    LANE_SET(l->next_x, x, shadow);
+    LANE_SET(l->next_y, y, shadow);
+    LANE_SET(l->next_z, z, shadow);
+    LANE_SET(f->draw, (vuint)DRAW_SHADOW, shadow);
+    l->shadow |= shadow;
+#endif
+    lanes_turn(l, x, y, z, onward);
+}
+
+#if LANE_SHADOWS
+/// Shadow rays that have ended: what got through counts, and the paths go on.
+static void lanes_lit(Lanes* l, vint mask) {
+    const vint clear = mask & (l->result == (vint)FLIGHT_ESCAPED);
+    for (int k = 0; k < CLUME_CHANNELS; ++k) LANE_SET(l->radiance[k], l->radiance[k] + l->light[k], clear);
+    LANE_SET(l->flight.t, (vfloat)0.0f, mask);
+    l->shadow &= ~mask;
+    lanes_turn(l, l->next_x, l->next_y, l->next_z, mask);
+}
+#endif
+
+#endif
