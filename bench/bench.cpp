@@ -22,7 +22,7 @@ namespace clume {
 namespace {
 
 constexpr const char* overview =
-    "Measures speed on one device. Sections: scenes (the renderer beside a plain host tracer), kernels, specialisation, scaling,\nadaptive (what a noise threshold saves), work (what an operation costs); with --study the study of strategies instead.\n"
+    "Measures speed on one device. Sections: scenes (the renderer beside a plain host tracer), peaks (of the device), kernels (and the share\nof the peaks that they reach), specialisation, lamps, scaling,\nadaptive (what a noise threshold saves), devices (that share a render), work (what an operation costs); with --study the study of strategies instead.\n"
     "An item is called section/name: --list prints them, --filter chooses. Everything takes about ten minutes on two cores,\nthe study 15 to 30.\n";
 constexpr const char* examples =
     "Examples: clume bench --filter ^scenes/          clume bench --filter 'flight/ball.*w16'\n"
@@ -52,6 +52,8 @@ std::optional<bench::Options> parse(int argc, char** argv) {
     app.add_option("--accelerator", o.accelerator, "of what visits chords, in scenes and scaling: cells, bvh or auto")->type_name("NAME");
     app.add_option("--study", o.study, "measure what docs/strategies.md shows instead, and put it there: 15 to 30 minutes")->type_name("DOCS");
     app.add_option("--json", o.json, "write the results to this file, too")->type_name("FILE");
+    app.add_flag("--roofline", o.roofline, "only peaks and kernels: what the device can do at most, and the share of it that every kernel reaches");
+    app.add_option("--report", o.report, "with --roofline: put its tables into DOCS/performance.md")->type_name("DOCS");
     app.add_flag("--quick", o.quick, "smaller samples and three rounds: a minute, to see that it works");
     try {
         app.parse(argc, argv);
@@ -79,6 +81,7 @@ std::optional<bench::Options> parse(int argc, char** argv) {
         for (const Method& m : strategies()) names.push_back(m.name);
         one_of("--strategy", o.strategy, names);
     }
+    if (!o.report.empty() && !o.roofline) throw UsageError("bench: --report: only with --roofline");
     one_of("--accelerator", o.accelerator, {"auto", "cells", "bvh"});
     return o;
 }
@@ -96,8 +99,13 @@ int run_bench(int argc, char** argv) {
     }
     if (!options->study.empty()) {
         bench_study_section(session);
+    } else if (options->roofline) {
+        bench_peaks_section(session);
+        bench_kernels_section(session);
+        if (!options->report.empty() && !options->list) write_roofline(session, options->report);
     } else {
         bench_scenes_section(session);
+        bench_peaks_section(session);
         bench_kernels_section(session);
         bench_specialisation_section(session);
         bench_lamps_section(session);

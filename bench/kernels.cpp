@@ -5,18 +5,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <ctime>
 #include <map>
-#include <memory>
-#include <optional>
 
-#include "bench/rays.h"
-#include "bench/scenes.h"
 #include "bench/sections.h"
+#include "tests/cases.h"
 
 namespace clume::bench {
 namespace {
 
 std::vector<std::string> registered;  // names, in order
+/// Of an item that has run: what it takes, and the rate of its fastest launch.
+struct Best {
+    Cost cost;
+    double items_s = 0;
+};
+std::map<std::string, Best> bests;
 
 /// Hands the medians over the repetitions to the session: at once, or at the end in the order registered.
 class Reporter : public benchmark::BenchmarkReporter {
@@ -26,10 +30,9 @@ public:
     void ReportRuns(const std::vector<Run>& runs) override {
         for (const Run& run : runs) {
             if (run.run_type != Run::RT_Iteration) continue;
-            Rates& r = rates_[run.run_name.function_name];
-            r.mega.push_back(run.counters.at("items_per_second") / 1e6);
-            r.work = run.counters.at("work");
-            if (at_once_ && r.mega.size() == static_cast<std::size_t>(run.repetitions)) record(run.run_name.function_name, r);
+            std::vector<double>& rates = rates_[run.run_name.function_name];
+            rates.push_back(run.counters.at("items_per_second"));
+            if (at_once_ && rates.size() == static_cast<std::size_t>(run.repetitions)) record(run.run_name.function_name, rates);
         }
     }
     void Finalize() override {
@@ -39,82 +42,35 @@ public:
     }
 
 private:
-    struct Rates {
-        std::vector<double> mega;
-        double work = 0;
-    };
     Session& session_;
     bool at_once_;
-    std::map<std::string, Rates> rates_;
+    std::map<std::string, std::vector<double>> rates_;
 
-    void record(const std::string& name, const Rates& r) {
-        const auto [low, high] = std::minmax_element(r.mega.begin(), r.mega.end());
-        const std::string work = r.work > 0 ? fmt::format("{:10.2f}", r.work) : "";
-        session_.record(name, fmt::format("{:46} {:10.3f} {:9.3f} {:9.3f} {}", name, median(r.mega), *low, *high, work),
-                        {{"mitems_s", median(r.mega)}, {"lowest", *low}, {"highest", *high}, {"work_per_item", r.work}});
+    void record(const std::string& name, const std::vector<double>& rates) {
+        const double rate = median(rates) * 1e-6, low = *std::min_element(rates.begin(), rates.end()) * 1e-6;
+        const auto& [cost, highest] = bests[name];
+        Fields fields{{"mitems_s", rate}, {"lowest", low}, {"highest", highest * 1e-6}};
+        std::string line = fmt::format("{:44} {:10.3f} {:9.3f} {:9.3f}", name, rate, low, highest * 1e-6);
+        // The peaks are the highest rates of single launches, too.
+        if (const auto share = share_of(cost, highest, peaks(session_))) {
+            line += fmt::format(" {:8.0f} {:7.0f} {:7.1f} {:6.1f} % {}", cost.operations, cost.bytes, cost.gathers, 100 * share->value, share->limit);
+            fields.insert(fields.end(), {{"operations", cost.operations}, {"bytes", cost.bytes}, {"gathers", cost.gathers}, {"footprint", cost.footprint}, {"share", share->value}, {"limit", share->limit}});
+        }
+        session_.record(name, line, std::move(fields));
     }
 };
 
-/// A scene as one strategy and accelerator see it, and its probe at one width. Only the last one asked for is kept.
-struct Field {
-    Scene scene;
-    DeviceScene device;
-    std::unique_ptr<Probe> probe;
-    std::vector<ProbeRay> camera, inside;
-    std::optional<double> work[2];  ///< per flight from the camera, from inside
-};
-
-/// Work per flight, by a program that counts: an untimed run of its own. Every width does the same work.
-double work_per_flight(Session& session, Field& f, bool inside, const std::string& accelerator) {
-    std::optional<double>& work = f.work[inside];
-    if (!work) {
-        RenderOptions options = session.render_options();
-        options.accelerator = accelerator;
-        options.count_work = true;
-        const auto& rays = inside ? f.inside : f.camera;
-        double sum = 0;
-        for (const ProbeHit& hit : Probe(session.device(), make_device_scene(f.scene, options)).flights(rays).values) sum += hit.work;
-        work = sum / static_cast<double>(rays.size());
-    }
-    return *work;
-}
-
-Field& field(Session& session, const std::string& scene, const std::string& strategy, const std::string& accelerator, int width) {
-    static std::string scene_key, probe_key;
-    static Field f;
-    const std::string wanted = scene + ' ' + strategy + ' ' + accelerator;
-    if (wanted != scene_key) {
-        f = {};
-        f.scene = bench_scene(scene);
-        f.scene.render.strategy = strategy;
-        RenderOptions options = session.render_options();
-        options.accelerator = accelerator;
-        f.device = make_device_scene(f.scene, options);
-        scene_key = wanted;
-        probe_key.clear();
-    }
-    if (const std::string key = wanted + ' ' + std::to_string(width); key != probe_key) {
-        f.probe.reset();
-        f.probe = std::make_unique<Probe>(session.device(), f.device, width);
-        // One primitive at a time is slow: fewer rays do.
-        f.camera = camera_rays(*f.probe, f.scene.film.width, f.scene.film.height, width == 1 ? 4 : 2, 0);
-        f.inside = inside_rays(f.device, f.camera.size(), 1);
-        probe_key = key;
-    }
-    return f;
-}
-
-void run(benchmark::State& state, const std::function<Launch(std::uint32_t)>& launch) {
+void run(benchmark::State& state, const std::string& name, const std::function<Launch(std::uint32_t)>& launch) {
     std::uint32_t number = 0;
-    double items = 0, work = 0;
+    double items = 0;
     for (auto _ : state) {
         const Launch l = launch(number++);
         state.SetIterationTime(l.device_s);
         items += l.items;
-        work = l.work_per_item;
+        bests[name].cost = l.cost;
+        if (l.device_s > 0) bests[name].items_s = std::max(bests[name].items_s, l.items / l.device_s);
     }
     state.SetItemsProcessed(static_cast<std::int64_t>(items));
-    state.counters["work"] = work;
 }
 
 /// `shuffled`: repetitions of all benchmarks in random order, so that a disturbance does not hit one of them alone.
@@ -133,62 +89,56 @@ void run_registered(Session& session, bool shuffled) {
 
 }  // namespace
 
+SizedLaunch::SizedLaunch(Session& session, Queue& queue, cl::Kernel& kernel, SetArguments set_arguments, double seconds, std::size_t most_items)
+    : queue_(queue), kernel_(kernel), local_(session.device().type == "cpu" ? 8 : 64), cpu_units_(session.device().type == "cpu" ? session.device().compute_units : 0) {
+    const std::size_t first = local_ * session.device().compute_units;
+    for (std::size_t items = first;; items *= 2) {
+        out_ = Buffer<float>(queue, items);
+        set_arguments(items, out_);
+        if (items == first) queue.launch(kernel, local_, local_);
+        // Of three, since a busy machine makes any one seem long.
+        const double s = std::min({queue.launch(kernel, items, local_), queue.launch(kernel, items, local_), queue.launch(kernel, items, local_)});
+        if (s >= seconds || 2 * items > most_items) return;
+    }
+}
+
+double SizedLaunch::operator()() const { return queue_.launch(kernel_, items(), local_); }
+
+double SizedLaunch::undisturbed() const {
+    const auto now = [] {
+        timespec t;
+        clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+        return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+    };
+    const double begin = now(), seconds = (*this)();
+    return cpu_units_ > 0 ? std::min(seconds, (now() - begin) / cpu_units_) : seconds;
+}
+
 std::vector<int> kernel_widths(const Session& session) {
     if (session.options().width > 0) return {session.options().width};
-    return {16, 8, 4, 1};
+    return {cases::vector_widths.begin(), cases::vector_widths.end()};
 }
+
+std::string with_width(const std::string& name, int width) { return fmt::format("{}/w{}", name, width); }
 
 void add_kernel_benchmark(Session& session, const std::string& item, std::function<Launch(std::uint32_t)> launch) {
     if (!session.wants(item)) return;
-    benchmark::RegisterBenchmark(item.c_str(), run, std::move(launch))
-        ->UseManualTime()
-        ->MinTime(session.options().quick ? 0.02 : 0.05)
-        ->Repetitions(session.rounds(5));
+    benchmark::RegisterBenchmark(item.c_str(), run, item, std::move(launch))->UseManualTime()->MinTime(session.options().quick ? 0.01 : 0.05)->Repetitions(session.rounds(5));
     registered.push_back(item);
-}
-
-void add_ray_benchmarks(Session& session) {
-    struct Method {
-        const char *strategy, *accelerator, *flight, *transmittance;  ///< names; null: not measured
-    };
-    static constexpr Method methods[] = {{"delta", "cells", "delta", nullptr},
-                                         {"decomposition", "cells", "decomposition_cells", "analytic_cells"},
-                                         {"decomposition", "bvh", "decomposition_bvh", "analytic_bvh"}};
-    for (const char* scene : {"ball", "close"})
-        for (const Method& m : methods)
-            for (const int width : kernel_widths(session)) {
-                // Null collisions look at one primitive at a time: the width changes nothing.
-                if (m.transmittance == nullptr && width != kernel_widths(session).front()) continue;
-                for (const bool inside : {true, false}) {
-                    const char* from = inside ? "inside" : "camera";
-                    const std::string suffix = m.transmittance ? fmt::format("/w{}", width) : "";
-                    add_kernel_benchmark(session, fmt::format("flight/{}/{}/{}{}", scene, m.flight, from, suffix), [=, &session](std::uint32_t number) {
-                        Field& f = field(session, scene, m.strategy, m.accelerator, width);
-                        const auto& rays = inside ? f.inside : f.camera;
-                        const auto result = f.probe->flights(rays, number);
-                        return Launch{static_cast<double>(rays.size()), result.device_s, work_per_flight(session, f, inside, m.accelerator)};
-                    });
-                    if (!m.transmittance) continue;
-                    add_kernel_benchmark(session, fmt::format("transmittance/{}/{}/{}{}", scene, m.transmittance, from, suffix), [=, &session](std::uint32_t) {
-                        Field& f = field(session, scene, m.strategy, m.accelerator, width);
-                        const auto& rays = inside ? f.inside : f.camera;
-                        return Launch{static_cast<double>(rays.size()), f.probe->transmittances(rays).device_s, 0};
-                    });
-                }
-            }
 }
 
 void bench_kernels_section(Session& session) {
     session.section("kernels",
-                    "flight, transmittance: an item is a ray, from inside (uniform in the inscribed ball, uniform directions) or from the\n"
-                    "camera (every other pixel of the whole film, every fourth at w1: coherent); work: groups of 16 evaluated per flight,\n"
-                    "for delta tentative collisions. group: an item is one ray against one primitive, all in the cache. wN: primitives per\n"
-                    "vector. Device time, medians; `highest` is the least disturbed.\n" +
-                        fmt::format("{:46} {:>10} {:>9} {:>9} {:>10}", "", "Mitems/s", "lowest", "highest", "work"));
-    add_ray_benchmarks(session);
-    run_registered(session, false);
+                    "Kernels one by one by device time: median and lowest of the repetitions, fastest launch; operations, bytes and places looked up\n"
+                    "at random per item, and the share of the device's peaks that the fastest launch reaches; wN: lanes per vector.\n" +
+                        fmt::format("{:44} {:>10} {:>9} {:>9} {:>8} {:>7} {:>7} {:>8} {}", "", "Mitems/s", "lowest", "highest", "ops", "bytes", "gathers", "share", "of"));
     add_group_benchmarks(session);
     run_registered(session, true);
+    add_accelerator_benchmarks(session);
+    add_block_benchmarks(session);
+    add_sort_benchmarks(session);
+    add_ray_benchmarks(session);
+    run_registered(session, false);
 }
 
 }  // namespace clume::bench

@@ -3,6 +3,7 @@
 // triangles tested by Möller and Trumbore's signed volumes, without their division) or as one shared unit icosahedron under each
 // ellipsoid's own transform (10 slabs), against the analytic test alone. Only measured, never rendered with.
 #include "ellipsoid.cl"
+#include "lanes.cl"
 
 #define PROXY_ANALYTIC 0
 #define PROXY_MESH 1
@@ -52,12 +53,6 @@ static vint line_meets_instance(__global const float* part, __constant const flo
         t_out = vselect(t_out, high, high < t_out);
     }
     return t_in <= t_out;
-}
-
-static float lanes_sum(vfloat v) {
-    float total = 0.0f;
-    for (int lane = 0; lane < CLUME_WIDTH; ++lane) total += ((const float*)&v)[lane];
-    return total;
 }
 
 /// Every line against every group. out, per line: x summed lengths of chords; PROXY_CHECK: ellipsoids, meshes and instances met,

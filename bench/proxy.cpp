@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Ellipsoids behind circumscribed icosahedra against the analytic test alone: 512 ellipsoids held in the cache, every line
 // against each. No tree, no ray-tracing hardware: what is compared is the test at a leaf.
+#include "bench/proxy.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -95,33 +97,54 @@ Data make_data(const Icosahedron& proxy, double overlap) {
 
 }  // namespace
 
+struct ProxyLines::Impl {
+    Impl(const DeviceInfo& device, const ProgramOptions& options, const Icosahedron& proxy, const Data& data)
+        : queue(device), kernel(make_kernel(queue, build_program(queue, "proxy.cl", options), "proxy_lines")),
+          groups(queue, data.groups), meshes(queue, data.meshes), faces(queue, proxy.faces), normals(queue, proxy.normals), lines(queue, data.lines), out(queue, kLines),
+          e2(data.e2), reach(data.reach) {}
+    Queue queue;
+    cl::Kernel kernel;
+    Buffer<float> groups, meshes;
+    Buffer<device::uint> faces;
+    Buffer<device::float4> normals, lines, out;
+    float e2, reach;
+};
+
+ProxyLines::ProxyLines(const DeviceInfo& device, int width, double overlap) {
+    const Icosahedron proxy;
+    ProgramOptions options;
+    options.define("CLUME_WIDTH", width);
+    impl_ = std::make_unique<Impl>(device, options, proxy, make_data(proxy, overlap));
+}
+ProxyLines::~ProxyLines() = default;
+
+double ProxyLines::tests() const { return static_cast<double>(kLines) * kGroups * CLUME_GROUP_SIZE; }
+
+double ProxyLines::launch(ProxyWork what) {
+    Impl& s = *impl_;
+    set_args(s.queue, s.kernel, 0, s.groups, s.meshes, s.faces, s.normals, s.lines, s.out, s.reach, cl_uint(kLines), cl_uint(kGroups), s.e2, cl_uint(what));
+    return s.queue.launch(s.kernel, kLines, 8);
+}
+
+std::vector<device::float4> ProxyLines::out() const { return impl_->out.download(); }
+
+double ProxyLines::byte_size(ProxyWork what) const {
+    return static_cast<double>(impl_->groups.byte_size() + (what == ProxyWork::mesh ? impl_->meshes.byte_size() : 0));
+}
+
 void study_proxy(Session& session, const Report& report) {
     if (!session.wants("proxy")) return;
-    const Icosahedron proxy;
-    Queue queue(session.device());
-    ProgramOptions options;
-    options.define("CLUME_WIDTH", session.options().width > 0 ? session.options().width : static_cast<int>(session.device().native_vector_width));
-    const cl::Program program = build_program(queue, "proxy.cl", options);
-    cl::Kernel kernel = make_kernel(queue, program, "proxy_lines");
-    const Buffer<device::uint> faces(queue, proxy.faces);
-    const Buffer<device::float4> normals(queue, proxy.normals);
     const char* names[] = {"analytic alone", "mesh of 20 triangles, then analytic", "shared icosahedron (10 slabs), then analytic"};
     const double bytes[] = {40, 40 + 12 * 12, 40};
     Table csv{{"overlap", "test", "mtests_s", "relative_time", "bytes_per_primitive", "share_met", "share_proxy_met", "lost"}},
         table{{"lines that meet an ellipsoid", "test", "million tests/s", "time", "bytes per primitive", "lines that meet the proxy"}};
     for (const double overlap : {1.0, 60.0}) {
-        const Data data = make_data(proxy, overlap);
-        const Buffer<float> groups(queue, data.groups), meshes(queue, data.meshes);
-        const Buffer<device::float4> lines(queue, data.lines);
-        const Buffer<device::float4> out(queue, kLines);
-        const auto launch = [&](std::uint32_t what) {
-            set_args(queue, kernel, 0, groups, meshes, faces, normals, lines, out, data.reach, cl_uint(kLines), cl_uint(kGroups), data.e2, cl_uint(what));
-            return queue.launch(kernel, kLines, 8);
-        };
-        const double tests = static_cast<double>(kLines) * kGroups * CLUME_GROUP_SIZE;
+        ProxyLines lines(session.device(), session.options().width > 0 ? session.options().width : static_cast<int>(session.device().native_vector_width), overlap);
+        const auto launch = [&](std::uint32_t what) { return lines.launch(static_cast<ProxyWork>(what)); };
+        const double tests = lines.tests();
         std::array<double, 4> met{};  // ellipsoids, meshes, instances, lost
-        launch(3);
-        for (const device::float4& v : out.download()) {
+        lines.launch(ProxyWork::check);
+        for (const device::float4& v : lines.out()) {
             met[0] += static_cast<double>(v.x) / tests;
             met[1] += static_cast<double>(v.y) / tests;
             met[2] += static_cast<double>(v.z) / tests;
@@ -136,7 +159,7 @@ void study_proxy(Session& session, const Report& report) {
                     seconds[what].push_back(s);
                     continue;
                 }
-                for (const device::float4& v : out.download()) sums[what] += static_cast<double>(v.x);
+                for (const device::float4& v : lines.out()) sums[what] += static_cast<double>(v.x);
             }
         for (std::uint32_t what = 0; what < 3; ++what) {
             // The least disturbed launch counts: they are short, and other programs only make them longer.

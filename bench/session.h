@@ -17,6 +17,7 @@ namespace clume::bench {
 
 struct Options {
     bool list = false, quick = false;
+    bool roofline = false;            ///< peaks and kernels alone
     std::string filter;               ///< regular expression, searched for in "section/name"
     std::string device;               ///< as --device; empty: the best one
     int width = 0;                    ///< of vectors; 0: the device's own (kernels: 16, 8, 4 and 1)
@@ -25,10 +26,17 @@ struct Options {
     std::string accelerator = "auto";
     std::string json;                 ///< file to write; empty: none
     std::string study;                ///< folder of docs that the study writes into; empty: no study
+    std::string report;               ///< folder of docs that the roofline writes into; empty: none
 };
 
 /// Named values of one item, in the order printed; NaN becomes null.
 using Fields = std::vector<std::pair<std::string, std::variant<double, std::string>>>;
+
+/// What was measured of one item.
+struct Result {
+    std::string section, item;
+    Fields fields;
+};
 
 class Session {
 public:
@@ -53,13 +61,10 @@ public:
     void note(const std::string& text);
 
     bool any() const { return any_; }
+    const std::vector<Result>& results() const { return results_; }
     std::string to_json();
 
 private:
-    struct Result {
-        std::string section, item;
-        Fields fields;
-    };
     Options options_;
     std::regex filter_;
     std::optional<DeviceInfo> device_;

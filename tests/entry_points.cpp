@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "src/self_test.h"
+#include "tests/cases.h"
 #include "tests/device_image.h"
 
 namespace clume::test {
@@ -21,36 +22,7 @@ void keep(Outputs& outputs, const std::string& name, const std::vector<Value>& v
     }
 }
 
-/// Arguments of a function: x in its domain and y.
-struct Domain {
-    const char* name;
-    MathFunction f;
-    float lo, hi;
-    bool log_spaced;
-};
-const Domain kDomains[] = {
-    {"rcp", MathFunction::rcp, 1e-18f, 1e18f, true},
-    {"divide", MathFunction::divide, 1e-9f, 1e9f, true},
-    {"rsqrt", MathFunction::rsqrt, 1e-18f, 1e18f, true},
-    {"sqrt", MathFunction::sqrt, 1e-18f, 1e18f, true},
-    {"exp", MathFunction::exp, -80, 20, false},
-    {"log", MathFunction::log, 1e-30f, 1e30f, true},
-    {"exponential", MathFunction::exponential, 1e-38f, 1e38f, true},
-    {"erfc", MathFunction::erfc, -5, 9, false},
-    {"erfc_inverse", MathFunction::erfc_inverse, 1e-30f, 1.99f, true},
-    {"epanechnikov_inverse", MathFunction::epanechnikov_inverse, 0, 1, false},
-    {"asin", MathFunction::asin, -1, 1, false},
-    {"acos", MathFunction::acos, -1, 1, false},
-    {"atan2", MathFunction::atan2, -3, 3, false},
-    {"sin", MathFunction::sin_turns, 0, 1, false},
-    {"cos", MathFunction::cos_turns, 0, 1, false},
-    {"erf_between", MathFunction::erf_between, -4, 2, false},
-    {"uniform", MathFunction::uniform, 1e-38f, 1e38f, true},
-    {"from_uint", MathFunction::from_uint, 1e-38f, 1e38f, true},
-    {"normalize", MathFunction::normalize_x, 1e-6f, 1e6f, true},
-};
-
-std::vector<float> arguments(const Domain& d, std::size_t count) {
+std::vector<float> arguments(const cases::MathCase& d, std::size_t count) {
     TestRandom random(7);
     std::vector<float> x{d.lo, d.hi};
     while (x.size() < count) {
@@ -62,22 +34,10 @@ std::vector<float> arguments(const Domain& d, std::size_t count) {
 
 /// Lights of every kind; with those of `mixed_scene` all seven.
 void add_lights(Scene& scene) {
-    Light point = light_of(LightKind::point), spot = light_of(LightKind::spot), sphere = light_of(LightKind::sphere), sheet = light_of(LightKind::rectangle);
-    point.position = {0.2, 0.1, -0.15};  // amid medium
-    point.intensity = {2, 1, 1.5};
-    spot.position = {-1.5, 0.8, -1};
-    spot.target = {0.1, 0, 0};
-    spot.intensity = {6, 7, 8};
-    spot.beam_rad = 0.2;
-    spot.cutoff_rad = 0.5;
-    sphere.center = {0.3, -1.5, 0.2};
-    sphere.radius = 0.15;
-    sphere.radiance = {9, 5, 4};
-    sheet.corner = {-1.2, 1.3, 0.4};
-    sheet.edge_u = {0.5, 0.1, 0};
-    sheet.edge_v = {0, 0.2, 0.6};
-    sheet.radiance = {3, 4, 5};
-    for (const Light& l : {point, spot, sphere, sheet, constant_light({0.2, 0.3, 0.4}, true)}) scene.lights.push_back(l);
+    for (const LightKind kind : {LightKind::point, LightKind::spot, LightKind::sphere, LightKind::rectangle, LightKind::constant}) {
+        scene.lights.push_back(cases::light(kind));
+        if (kind == LightKind::point) scene.lights.back().position = {0.2, 0.1, -0.15};  // amid medium
+    }
 }
 
 }  // namespace
@@ -142,7 +102,7 @@ Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t cou
     const SelfTestResult arithmetic = self_test(device, width);
     out["probe_arithmetic"] = {arithmetic.error.empty() ? 0u : 1u, arithmetic.outside_exact_set.empty() ? 0u : 1u};
     out["probe_words"] = {arithmetic.error.empty() ? 0u : 1u};
-    for (const Domain& d : kDomains) {
+    for (const cases::MathCase& d : cases::math_functions) {
         const std::vector<float> x = arguments(d, count);
         std::vector<float> y;
         TestRandom random(8);
@@ -156,8 +116,8 @@ Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t cou
         for (int k = 0; k < 4; ++k) counters[i].v[k] = random.word(), keys[i].v[k] = random.word();
     keep(out, "probe_philox", probe.philox(counters, keys));
     keep(out, "probe_primitive_bits", probe.primitive_bits(3, 17, 19, count));
-    for (const device::uint kind : {PHASE_ISOTROPIC, PHASE_HENYEY_GREENSTEIN, PHASE_RAYLEIGH})
-        for (const float g : {0.0f, 0.9f, -0.4f}) keep(out, fmt::format("probe_phase {} {}", kind, g), probe.phases(kind, g, {0.48f, 0.6f, 0.64f}, 5, count));
+    for (const cases::PhaseCase& phase : cases::phases)
+        for (const float g : {0.0f, 0.9f, -0.4f}) keep(out, fmt::format("probe_phase {} {}", phase.kind, g), probe.phases(phase.kind, g, {0.48f, 0.6f, 0.64f}, 5, count));
 
     std::vector<Probe::LampView> views;
     std::vector<float> places;
@@ -182,8 +142,8 @@ Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t cou
         const std::size_t at = in.size() % groups.size();
         in.insert(in.end(), groups.begin() + static_cast<std::ptrdiff_t>(at), groups.begin() + static_cast<std::ptrdiff_t>(at + CLUME_GROUP_FLOATS));
     }
-    for (const device::uint family : {FAMILY_GAUSSIAN, FAMILY_EPANECHNIKOV, FAMILY_UNIFORM})
-        for (const bool quadratic : {false, true}) keep(out, fmt::format("probe_group {} {}", family, quadratic), probe.groups(rays, in, family, 6.25f, quadratic));
+    for (const cases::FamilyCase& family : cases::families)
+        for (const bool quadratic : {false, true}) keep(out, fmt::format("probe_group {} {}", family.bit, quadratic), probe.groups(rays, in, family.bit, 6.25f, quadratic));
     // Its sums over lanes are for timing alone: their order is the width's.
     if (probe.width() == 16) keep(out, "probe_group_work", probe.group_work(GroupWork::flight, rays, groups, FAMILY_GAUSSIAN, 6.25f).values);
     return out;

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "tests/cases.h"
 #include "tests/grid_scenes.h"
 #include "tests/image_test.h"
 #include "tests/reference/analytic_scenes.h"
@@ -23,23 +24,8 @@ inline RenderResult render_pair(const Pair& pair, Scene scene, std::uint32_t spp
     return render_by({pair.strategy, pair.accelerator}, scene, spp, seed, options);
 }
 
-inline Light sunlight() {
-    Light l = light_of(LightKind::directional);
-    l.direction = {-0.4, -1, 0.5};
-    l.irradiance = {4, 3, 2};
-    return l;
-}
-
-/// 8 × 4 texels of uneven colours, none so bright that few samples make the image.
-inline Light small_environment() {
-    Light l = light_of(LightKind::envmap);
-    l.image.width = 8;
-    l.image.height = 4;
-    for (int i = 0; i < 32; ++i)
-        for (int c = 0; c < 3; ++c) l.image.rgb.push_back(0.1f * static_cast<float>((i * (3 + 2 * c) + 5 * c) % 11));
-    l.rotate_y_rad = 0.3;
-    return l;
-}
+inline Light sunlight() { return cases::light(LightKind::directional); }
+inline Light small_environment() { return cases::light(LightKind::envmap); }
 
 /// Ellipsoids of three families in each other, an albedo and an emission for each, many with a g of their own; a sun and an
 /// environment, both sampled.

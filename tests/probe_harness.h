@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include "src/probe.h"
+#include "tests/cases.h"
 
 namespace clume::probing {
 
-inline constexpr int kWidths[] = {16, 8, 4, 1};
+inline constexpr auto& kWidths = cases::vector_widths;
 
 inline std::uint32_t bits(float f) { return std::bit_cast<std::uint32_t>(f); }
 inline float from_bits(std::uint32_t b) { return std::bit_cast<float>(b); }

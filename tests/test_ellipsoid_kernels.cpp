@@ -27,16 +27,13 @@ using Chord = reference::high::Chord;
 constexpr double kGamma = 0x1p-24;
 const double depth_limit = stated_limit("ellipsoid.cl", "depth_part").value;
 
-struct Family {
-    KernelFamily kernel;
-    device::uint bit;
-    float e2;
-    const char* name;
-};
-const Family kFamilies[] = {{KernelFamily::gaussian, FAMILY_GAUSSIAN, 9.0f, "gaussian"},
-                            {KernelFamily::gaussian, FAMILY_GAUSSIAN, 30.25f, "gaussian, extent 5.5"},
-                            {KernelFamily::epanechnikov, FAMILY_EPANECHNIKOV, 7.0f, "epanechnikov"},
-                            {KernelFamily::uniform, FAMILY_UNIFORM, 5.0f, "uniform"}};
+using Family = cases::FamilyCase;
+/// The families, and a Gaussian whose support ends where hardly anything is left.
+const std::vector<Family> kFamilies = [] {
+    std::vector<Family> all(std::begin(cases::families), std::end(cases::families));
+    all.insert(all.begin() + 1, {KernelFamily::gaussian, FAMILY_GAUSSIAN, 30.25f, "gaussian, extent 5.5"});
+    return all;
+}();
 
 double d(float v) { return static_cast<double>(v); }
 double num(const Real& r) { return static_cast<double>(r); }

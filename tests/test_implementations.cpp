@@ -7,6 +7,7 @@
 
 #include "runtime/embedded.h"
 #include "src/pilot.h"
+#include "tests/cases.h"
 #include "tests/entry_points.h"
 #include "tests/temp_folder.h"
 
@@ -15,7 +16,7 @@ using namespace clume::test;
 
 namespace {
 
-constexpr int kAllWidths[] = {16, 8, 4, 1};
+constexpr auto& kAllWidths = cases::vector_widths;
 constexpr std::size_t kFew = 32, kMany = 4096;
 constexpr std::uint32_t kSamples = 32;  // 8,192 paths: a rounding that differs in one of them shows in the exact sums
 

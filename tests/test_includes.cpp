@@ -24,7 +24,7 @@ bool is_allowed(const std::string& from, const std::string& to) {
     const std::string lower = floor_of(to);
     const std::set<std::string> above_all{"bench", "tests"};
     if (floor_of(from) == "kernels") return lower == "kernels";
-    if (from.ends_with(".cl") && above_all.count(floor_of(from)) == 1) return lower == "kernels";
+    if (from.ends_with(".cl") && above_all.count(floor_of(from)) == 1) return lower == "kernels" || (lower == floor_of(from) && to.ends_with(".cl"));
     if (floor_of(from) == "runtime") return lower == "runtime";
     if (above_all.count(floor_of(from)) == 1 && above_all.count(lower) == 1) return true;
     if (from == "src/main.cpp" && to == "bench/bench.h") return true;

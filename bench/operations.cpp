@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#include "bench/operations.h"
+
+#include <stdexcept>
+#include <string>
+
+namespace clume::bench {
+namespace {
+
+// Name, operations, lanes, defines, code.
+constexpr Block block_table[] = {
+    {"rcp", 7, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = rcp_v(x);"},
+    {"rsqrt", 12, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = rsqrt_v(x);"},
+    {"sqrt", 19, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = sqrt_v(x);"},
+    {"exp", 15, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = exp_v(x);"},
+    {"log", 19, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = log_v(x);"},
+    {"erfc", 37, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = erfc_v(x);"},
+    {"erfc_inverse", 35, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = erfc_inverse_v(x);"},
+    {"epanechnikov_inverse", 30, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = epanechnikov_inverse_v(x);"},
+    {"divide", 10, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = divide_v(x, y);"},
+    {"exponential", 36, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = exponential_v(as_vuint(x));"},
+    {"from_uint", 6, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = from_uint_v(as_vuint(x));"},
+    {"erf_between", 88, 16, "", "const vfloat x = vload_row(a), y = vload_row(a + 16); *(__global vfloat*)out = erf_between(x, y, y - x);"},
+    {"asin", 12, 1, "", "const float x = a[0], y = a[1]; out[0] = asin_s(x);"},
+    {"acos", 13, 1, "", "const float x = a[0], y = a[1]; out[0] = acos_s(x);"},
+    {"atan2", 22, 1, "", "const float x = a[0], y = a[1]; out[0] = atan2_s(x, y);"},
+    {"sin", 20, 1, "", "const float x = a[0], y = a[1]; out[0] = sincos_turns_s(x).x;"},
+    {"cos", 21, 1, "", "const float x = a[0], y = a[1]; out[0] = sincos_turns_s(x).y;"},
+    {"uniform", 10, 1, "", "const float x = a[0], y = a[1]; out[0] = uniform_s(as_uint(x));"},
+    {"normalize", 16, 1, "", "const float x = a[0], y = a[1]; out[0] = normalize_s((float3)(x, y, y)).x;"},
+    {"intersect_whitened", 66, 16, "", "Chord c; const vint hit = intersect(a, o, d, a[206], &c); *(__global vint*)(out + 112) = hit; *(__global Chord*)out = c;"},
+    {"intersect_quadratic", 71, 16, "", "Chord c; const vint hit = intersect_quadratic(a, o, d, a[206], &c); *(__global vint*)(out + 112) = hit; *(__global Chord*)out = c;"},
+    {"proxy_mesh", 943, 16, "", "*(__global vint*)out = line_meets_mesh(a, faces, o, d);"},
+    {"proxy_instance", 276, 16, "", "*(__global vint*)out = line_meets_instance(a, normals, o, d, a[206]);"},
+    {"density/gaussian", 31, 16, "-DCLUME_FAMILIES=FAMILY_GAUSSIAN -DCLUME_ONE_MEDIUM=1", "*(__global vfloat*)out = density_part(a, o, FAMILY_GAUSSIAN, (vfloat)9.0f);"},
+    {"depth/gaussian", 134, 16, "-DCLUME_FAMILIES=FAMILY_GAUSSIAN -DCLUME_ONE_MEDIUM=1", "const Chord c = *(__global const Chord*)a; const vfloat s = vload_row(a + 112), t0 = vload_row(a + 128), t1 = vload_row(a + 144); *(__global vfloat*)out = depth_part(&c, s, t0, t1, FAMILY_GAUSSIAN, (vfloat)9.0f);"},
+    {"inverse/gaussian", 131, 16, "-DCLUME_FAMILIES=FAMILY_GAUSSIAN -DCLUME_ONE_MEDIUM=1", "const Chord c = *(__global const Chord*)a; const vfloat s = vload_row(a + 112), t0 = vload_row(a + 128), t1 = vload_row(a + 144); *(__global vfloat*)out = flight_part(&c, s, t0, t1, FAMILY_GAUSSIAN, (vfloat)9.0f);"},
+    {"kernel/gaussian", 30, 1, "-DCLUME_FAMILIES=FAMILY_GAUSSIAN -DCLUME_ONE_MEDIUM=1", "out[0] = primitive_kernel(primitives, a[0], a[1], a[2]);"},
+    {"density/epanechnikov", 22, 16, "-DCLUME_FAMILIES=FAMILY_EPANECHNIKOV -DCLUME_ONE_MEDIUM=1", "*(__global vfloat*)out = density_part(a, o, FAMILY_EPANECHNIKOV, (vfloat)9.0f);"},
+    {"depth/epanechnikov", 46, 16, "-DCLUME_FAMILIES=FAMILY_EPANECHNIKOV -DCLUME_ONE_MEDIUM=1", "const Chord c = *(__global const Chord*)a; const vfloat s = vload_row(a + 112), t0 = vload_row(a + 128), t1 = vload_row(a + 144); *(__global vfloat*)out = depth_part(&c, s, t0, t1, FAMILY_EPANECHNIKOV, (vfloat)9.0f);"},
+    {"inverse/epanechnikov", 86, 16, "-DCLUME_FAMILIES=FAMILY_EPANECHNIKOV -DCLUME_ONE_MEDIUM=1", "const Chord c = *(__global const Chord*)a; const vfloat s = vload_row(a + 112), t0 = vload_row(a + 128), t1 = vload_row(a + 144); *(__global vfloat*)out = flight_part(&c, s, t0, t1, FAMILY_EPANECHNIKOV, (vfloat)9.0f);"},
+    {"kernel/epanechnikov", 21, 1, "-DCLUME_FAMILIES=FAMILY_EPANECHNIKOV -DCLUME_ONE_MEDIUM=1", "out[0] = primitive_kernel(primitives, a[0], a[1], a[2]);"},
+    {"density/uniform", 14, 16, "-DCLUME_FAMILIES=FAMILY_UNIFORM -DCLUME_ONE_MEDIUM=1", "*(__global vfloat*)out = density_part(a, o, FAMILY_UNIFORM, (vfloat)9.0f);"},
+    {"depth/uniform", 4, 16, "-DCLUME_FAMILIES=FAMILY_UNIFORM -DCLUME_ONE_MEDIUM=1", "const Chord c = *(__global const Chord*)a; const vfloat s = vload_row(a + 112), t0 = vload_row(a + 128), t1 = vload_row(a + 144); *(__global vfloat*)out = depth_part(&c, s, t0, t1, FAMILY_UNIFORM, (vfloat)9.0f);"},
+    {"inverse/uniform", 17, 16, "-DCLUME_FAMILIES=FAMILY_UNIFORM -DCLUME_ONE_MEDIUM=1", "const Chord c = *(__global const Chord*)a; const vfloat s = vload_row(a + 112), t0 = vload_row(a + 128), t1 = vload_row(a + 144); *(__global vfloat*)out = flight_part(&c, s, t0, t1, FAMILY_UNIFORM, (vfloat)9.0f);"},
+    {"kernel/uniform", 14, 1, "-DCLUME_FAMILIES=FAMILY_UNIFORM -DCLUME_ONE_MEDIUM=1", "out[0] = primitive_kernel(primitives, a[0], a[1], a[2]);"},
+    {"node", 41, 8, "", "*(__global float8*)out = bvh_test(nodes, o, d, a[206], a[207]);"},
+    {"philox", 68, 1, "", "*(__global uint4*)out = philox(*(__global const uint4*)a, (uint2)(as_uint(a[4]), as_uint(a[5])));"},
+    {"primitive_bits", 14, 16, "", "*(__global vuint*)out = primitive_bits(as_vuint(vload_row(a)), (uint2)(as_uint(a[16]), as_uint(a[17])));"},
+    {"phase_sample/isotropic", 72, 1, "", "float pdf; const float3 s = phase_sample(PHASE_ISOTROPIC, a[0], d, *(__global const uint4*)(a + 4), &pdf); *(__global float4*)out = (float4)(s, pdf);"},
+    {"phase_sample/henyey_greenstein", 172, 1, "", "float pdf; const float3 s = phase_sample(PHASE_HENYEY_GREENSTEIN, a[0], d, *(__global const uint4*)(a + 4), &pdf); *(__global float4*)out = (float4)(s, pdf);"},
+    {"phase_value/henyey_greenstein", 22, 1, "", "out[0] = phase_value(PHASE_HENYEY_GREENSTEIN, a[0], a[1]);"},
+    {"phase_sample/rayleigh", 153, 1, "", "float pdf; const float3 s = phase_sample(PHASE_RAYLEIGH, a[0], d, *(__global const uint4*)(a + 4), &pdf); *(__global float4*)out = (float4)(s, pdf);"},
+    {"phase_value/rayleigh", 3, 1, "", "out[0] = phase_value(PHASE_RAYLEIGH, a[0], a[1]);"},
+    {"light/point", 58, 1, "-DCLUME_NEE=LIGHT_POINT", "LightSample s; if (light_sample(o, *(__global const uint4*)a, *(__global const uint4*)(a + 4), &s, params, lights, texels, alias)) *(__global LightSample*)out = s;", true},
+    {"light/spot", 132, 1, "-DCLUME_NEE=LIGHT_SPOT", "LightSample s; if (light_sample(o, *(__global const uint4*)a, *(__global const uint4*)(a + 4), &s, params, lights, texels, alias)) *(__global LightSample*)out = s;", true},
+    {"light/directional", 27, 1, "-DCLUME_NEE=LIGHT_DIRECTIONAL", "LightSample s; if (light_sample(o, *(__global const uint4*)a, *(__global const uint4*)(a + 4), &s, params, lights, texels, alias)) *(__global LightSample*)out = s;", true},
+    {"light/sphere", 272, 1, "-DCLUME_NEE=LIGHT_SPHERE", "LightSample s; if (light_sample(o, *(__global const uint4*)a, *(__global const uint4*)(a + 4), &s, params, lights, texels, alias)) *(__global LightSample*)out = s;", true},
+    {"light/rectangle", 101, 1, "-DCLUME_NEE=LIGHT_RECTANGLE", "LightSample s; if (light_sample(o, *(__global const uint4*)a, *(__global const uint4*)(a + 4), &s, params, lights, texels, alias)) *(__global LightSample*)out = s;", true},
+    {"light/envmap", 210, 1, "-DCLUME_NEE=LIGHT_ENVMAP", "LightSample s; if (light_sample(o, *(__global const uint4*)a, *(__global const uint4*)(a + 4), &s, params, lights, texels, alias)) *(__global LightSample*)out = s;", true},
+    {"light/constant", 103, 1, "-DCLUME_NEE=LIGHT_CONSTANT", "LightSample s; if (light_sample(o, *(__global const uint4*)a, *(__global const uint4*)(a + 4), &s, params, lights, texels, alias)) *(__global LightSample*)out = s;", true},
+    {"environment/constant", 23, 1, "-DCLUME_LIGHTS=LIGHT_CONSTANT -DCLUME_NEE=LIGHT_CONSTANT -DCLUME_HITS=LIGHT_CONSTANT", "*(__global spectrum*)out = environment_radiance(d, a[0], false, params, lights, texels, alias);", true},
+    {"environment/envmap", 120, 1, "-DCLUME_LIGHTS=LIGHT_ENVMAP -DCLUME_NEE=LIGHT_ENVMAP -DCLUME_HITS=LIGHT_ENVMAP", "*(__global spectrum*)out = environment_radiance(d, a[0], false, params, lights, texels, alias);", true},
+    {"film", 120, 1, "", "ulong sums[FILM_WORDS]; for (int i = 0; i < FILM_WORDS; ++i) sums[i] = ((__global const ulong*)a)[i]; film_sample(sums, (float3)(a[100], a[101], a[102]), a[103]); for (int i = 0; i < FILM_WORDS; ++i) ((__global ulong*)out)[i] = sums[i];", true},
+    {"compare_exchange", 9, 1, "", "float t[2] = {a[0], a[1]}; uint id[2] = {as_uint(a[2]), as_uint(a[3])}; compare_exchange(t, id, 0, 1); out[0] = t[0]; out[1] = t[1]; out[2] = as_float(id[0]); out[3] = as_float(id[1]);"},
+};
+
+}  // namespace
+
+std::span<const Block> blocks() { return block_table; }
+
+double operations(std::string_view block) {
+    for (const Block& b : block_table)
+        if (block == b.name) return b.operations;
+    throw std::logic_error("no block of code is called " + std::string(block));
+}
+
+}  // namespace clume::bench
