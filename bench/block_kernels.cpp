@@ -76,7 +76,7 @@ Make over_vectors(Session& session, const std::string& kernel, bool with_g) {
 }
 
 void add_math(Session& session) {
-    static const std::set<std::string> of_one = {"asin", "acos", "atan2", "sin", "cos", "uniform", "normalize"};
+    static const std::set<std::string> of_one = {"asin", "acos", "atan2", "normalize"};
     static const std::set<std::string> without_built_in = {"erfc_inverse", "epanechnikov_inverse"};
     for (const cases::MathCase& f : cases::math_functions)
         for (const char* whose : {"own", "built_in"})

@@ -147,8 +147,8 @@ std::vector<Choice> choices(const std::string& scene, bool flights) {
     std::vector<Choice> all;
     for (const Method& m : flights ? strategies() : estimators()) {
         const bool either = flights ? m.program == STRATEGY_DECOMPOSITION : m.program == TRANSMITTANCE_ANALYTIC;
-        // Null collisions look at one primitive at a time: the width changes nothing. So do the flights of `binary` here.
-        const bool has_width = !m.null_collisions && (flights || m.program != TRANSMITTANCE_BINARY);
+        // Estimates by null collisions look at one primitive at a time: the width changes nothing. Flights go side by side.
+        const bool has_width = flights || (!m.null_collisions && m.program != TRANSMITTANCE_BINARY);
         for (const char* accelerator : either ? std::vector<const char*>{"cells", "bvh"} : std::vector<const char*>{"auto"})
             all.push_back({either ? fmt::format("{}_{}", m.name, accelerator) : m.name,
                            {scene, flights ? m.name : either ? "decomposition" : "delta", flights ? "analytic" : m.name, accelerator, !flights}, has_width});

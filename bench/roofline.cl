@@ -32,6 +32,16 @@ static uint4 cheap_bits(uint i, uint k) {
     return (uint4)(x, x * 0x85EBCA6Bu, x ^ 0x27D4EB2Fu, x * 0xC2B2AE35u);
 }
 
+static vfloat sine_of_turns(vfloat x) {
+    vfloat cosine;
+    return sincos_turns_v(x, &cosine);
+}
+static vfloat cosine_of_turns(vfloat x) {
+    vfloat cosine;
+    sincos_turns_v(x, &cosine);
+    return cosine;
+}
+
 // Elementary functions: `vectors` pairs of vectors x, y, one after the other.
 #define MATH(name, type, width, load, call)                                                                    \
     __kernel void name(__global const float* in, __global float* out, uint count, uint vectors) {             \
@@ -69,14 +79,14 @@ MATH_V(exponential, exponential_v(as_vuint(x)), -log((convert_vfloat(as_vuint(x)
 MATH_V(erfc, erfc_v(x), erfc(x))
 MATH_V(erf_between, erf_between(x, y, y - x), erf(y) - erf(x))
 MATH_V(from_uint, from_uint_v(as_vuint(x)), convert_vfloat(as_vuint(x)))
+MATH_V(uniform, uniform_v(as_vuint(x)), (convert_vfloat(as_vuint(x)) + 0.5f) * 0x1p-32f)
+MATH_V(sin, sine_of_turns(x), sinpi(2.0f * x))
+MATH_V(cos, cosine_of_turns(x), cospi(2.0f * x))
 MATH(own_erfc_inverse, vfloat, CLUME_WIDTH, vload_row, erfc_inverse_v(x))
 MATH(own_epanechnikov_inverse, vfloat, CLUME_WIDTH, vload_row, epanechnikov_inverse_v(x))
 MATH_S(asin, asin_s(x), asin(x))
 MATH_S(acos, acos_s(x), acos(x))
 MATH_S(atan2, atan2_s(x, y), atan2(x, y))
-MATH_S(sin, sincos_turns_s(x).x, sinpi(2.0f * x))
-MATH_S(cos, sincos_turns_s(x).y, cospi(2.0f * x))
-MATH_S(uniform, uniform_s(as_uint(x)), (convert_float(as_uint(x)) + 0.5f) * 0x1p-32f)
 MATH_S(normalize, normalize_s((float3)(x, y, y)).x, normalize((float3)(x, y, y)).x)
 
 /// Blocks of four random words.
@@ -115,7 +125,7 @@ __kernel void random_primitive_bits(__global float* out, uint count, uint rounds
         const uint i = (uint)get_global_id(0);                                                                                \
         if (i >= count) return;                                                                                               \
         float sum = 0.0f;                                                                                                     \
-        for (uint k = 0; k < rounds; ++k) sum += phase_value(kind, g, 1.0f + directions[k].x);                                \
+        for (uint k = 0; k < rounds; ++k) sum += phase_value_s(kind, g, 1.0f + directions[k].x);                                \
         out[i] = sum;                                                                                                         \
     }
 PHASE(isotropic, PHASE_ISOTROPIC)
