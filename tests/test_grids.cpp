@@ -20,7 +20,7 @@ constexpr auto kTrilinear = Interpolation::trilinear;
 constexpr auto kNearest = Interpolation::nearest;
 
 /// Dense and sparse, both interpolations, odd sizes, far and negative lattice positions, turned and mirrored.
-std::vector<Case> cases() {
+std::vector<Case> grid_cases() {
     std::vector<Case> all;
     const auto axes = turned_axes(0.1);
     for (const Interpolation i : {kTrilinear, kNearest}) {
@@ -82,7 +82,7 @@ double allowed(const HostGrid& host, const WorldRay& r, double depth, Interpolat
 }  // namespace
 
 TEST_CASE("Grids.DensityIsTheInterpolation", "[kernels]") {
-    for (const Case& c : cases()) {
+    for (const Case& c : grid_cases()) {
         const DeviceScene device = make_device_scene(c.scene, {});
         const HostGrid host = host_density(c.scene.grids[0]);
         Probe probe(test_device(), device);
@@ -113,7 +113,7 @@ TEST_CASE("Grids.DensityIsTheInterpolation", "[kernels]") {
 }
 
 TEST_CASE("Grids.DepthEqualsQuadrature", "[kernels]") {
-    for (const Case& c : cases()) {
+    for (const Case& c : grid_cases()) {
         const DeviceScene device = make_device_scene(c.scene, {});
         const HostGrid host = host_density(c.scene.grids[0]);
         const auto rays = rays_through(c.scene, device, 1600, 5);
@@ -137,7 +137,7 @@ TEST_CASE("Grids.DepthEqualsQuadrature", "[kernels]") {
 }
 
 TEST_CASE("Grids.DepthIsAdditive", "[kernels]") {
-    for (const Case& c : cases()) {
+    for (const Case& c : grid_cases()) {
         const DeviceScene device = make_device_scene(c.scene, {});
         const HostGrid host = host_density(c.scene.grids[0]);
         Probe probe(test_device(), device);
@@ -160,7 +160,7 @@ TEST_CASE("Grids.DepthIsAdditive", "[kernels]") {
 }
 
 TEST_CASE("Grids.InverseComesBack", "[kernels]") {
-    for (const Case& c : cases())
+    for (const Case& c : grid_cases())
         for (const char* how : {"newton", "bisection"}) {
             Scene scene = c.scene;
             DeviceScene device = make_device_scene(scene, {});
@@ -196,7 +196,7 @@ TEST_CASE("Grids.InverseComesBack", "[kernels]") {
 TEST_CASE("Grids.BoundsHold", "[kernels]") {
     // Over every brick and every cell of a table of bounds: the density at many points, the corners' among them, lies between
     // the two; and an upper bound is no higher than it must be.
-    for (const Case& c : cases()) {
+    for (const Case& c : grid_cases()) {
         Scene scene = c.scene;
         const GridMedium& m = scene.grids[0];
         const HostGrid host = host_density(m);
