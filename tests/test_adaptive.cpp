@@ -324,8 +324,8 @@ TEST_CASE("Adaptive.CropsAndProgressiveWorkToo") {
 }
 
 TEST_CASE("Adaptive.StoppedRunsKeepWhatIsDone", "[quick]") {
-    Renderer renderer(uneven(), within(1e-4));
     for (const std::string part : {"first samples", "measuring noise", ""}) {
+        Renderer renderer(uneven(), within(part.empty() ? 2e-2 : 1e-4));  // the pilot is to end, the image not
         std::atomic<bool> stop{false};
         bool seen = false;
         Accumulation film = renderer.start(1);
@@ -347,6 +347,7 @@ TEST_CASE("Adaptive.StoppedRunsKeepWhatIsDone", "[quick]") {
         if (part == "") CHECK(stats.samples_max > 16);
         else CHECK(stats.samples_max <= 16);
     }
+    Renderer renderer(uneven(), within(1e-4));
     Accumulation film = renderer.start(1);
     renderer.extend(film, 100000000, {{}, nullptr, 1.0});
     const RenderStats stats = renderer.result(film).stats;
