@@ -84,7 +84,7 @@ void measure(Session& session, const std::string& name) {
     const int rounds = session.rounds(7);
     const bool on_cpu = session.device().type == "cpu";
     for (int round = 0; round < rounds; ++round) {
-        const auto seed = static_cast<std::uint64_t>(2 * round);
+        const auto seed = 2 * static_cast<std::uint64_t>(round);
         const RenderResult r = render(adaptive, seed, most);
         const NoiseStats& noise = r.stats.noise.value();
         const double all = static_cast<double>(noise.paths + noise.pilot_paths) / adaptive.rendered_pixels();

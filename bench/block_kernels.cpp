@@ -55,7 +55,7 @@ SceneProgram& general_program(Session& session, int width) {
 using Make = std::function<std::unique_ptr<Ready>()>;
 
 /// `make` leaves `launch` set; a work-item does `items`.
-void add(Session& session, const std::string& name, Make make, double items, Cost cost) {
+void add(Session& session, const std::string& name, const Make& make, double items, Cost cost) {
     add_kernel_benchmark(session, name, [=, ready = std::shared_ptr<Ready>()](std::uint32_t) mutable {
         if (!ready) ready = make();
         return Launch{items * static_cast<double>(ready->launch->items()), (*ready->launch)(), cost};

@@ -63,7 +63,7 @@ private:
 void run(benchmark::State& state, const std::string& name, const std::function<Launch(std::uint32_t)>& launch) {
     std::uint32_t number = 0;
     double items = 0;
-    for (auto _ : state) {
+    for (auto _ : state) {  // NOLINT(clang-analyzer-deadcode.DeadStores)
         const Launch l = launch(number++);
         state.SetIterationTime(l.device_s);
         items += l.items;
@@ -89,7 +89,7 @@ void run_registered(Session& session, bool shuffled) {
 
 }  // namespace
 
-SizedLaunch::SizedLaunch(Session& session, Queue& queue, cl::Kernel& kernel, SetArguments set_arguments, double seconds, std::size_t most_items)
+SizedLaunch::SizedLaunch(Session& session, Queue& queue, cl::Kernel& kernel, const SetArguments& set_arguments, double seconds, std::size_t most_items)
     : queue_(queue), kernel_(kernel), local_(session.device().type == "cpu" ? 8 : 64), cpu_units_(session.device().type == "cpu" ? session.device().compute_units : 0) {
     const std::size_t first = local_ * session.device().compute_units;
     for (std::size_t items = first;; items *= 2) {
@@ -121,9 +121,9 @@ std::vector<int> kernel_widths(const Session& session) {
 
 std::string with_width(const std::string& name, int width) { return fmt::format("{}/w{}", name, width); }
 
-void add_kernel_benchmark(Session& session, const std::string& item, std::function<Launch(std::uint32_t)> launch) {
+void add_kernel_benchmark(Session& session, const std::string& item, const std::function<Launch(std::uint32_t)>& launch) {
     if (!session.wants(item)) return;
-    benchmark::RegisterBenchmark(item.c_str(), run, item, std::move(launch))->UseManualTime()->MinTime(session.options().quick ? 0.01 : 0.05)->Repetitions(session.rounds(5));
+    benchmark::RegisterBenchmark(item.c_str(), run, item, launch)->UseManualTime()->MinTime(session.options().quick ? 0.01 : 0.05)->Repetitions(session.rounds(5));
     registered.push_back(item);
 }
 

@@ -20,7 +20,7 @@ struct Launch {
 };
 
 /// Registers an item of the section: `launch` is called again and again with 0, 1, 2, … Nothing is done before the first call.
-void add_kernel_benchmark(Session& session, const std::string& item, std::function<Launch(std::uint32_t)> launch);
+void add_kernel_benchmark(Session& session, const std::string& item, const std::function<Launch(std::uint32_t)>& launch);
 
 void add_ray_benchmarks(Session& session);    ///< ray_kernels.cpp: free flights and transmittances through whole scenes
 void add_group_benchmarks(Session& session);  ///< group_kernels.cpp: one ray against vectors of primitives
@@ -38,7 +38,7 @@ class SizedLaunch {
 public:
     using SetArguments = std::function<void(std::size_t items, Buffer<float>& out)>;
     /// The kernel has run when this returns: no launch after it holds code generation.
-    SizedLaunch(Session& session, Queue& queue, cl::Kernel& kernel, SetArguments set_arguments, double seconds = 3e-3, std::size_t most_items = std::size_t{1} << 22);
+    SizedLaunch(Session& session, Queue& queue, cl::Kernel& kernel, const SetArguments& set_arguments, double seconds = 3e-3, std::size_t most_items = std::size_t{1} << 22);
     std::size_t items() const { return out_.size(); }
     double operator()() const;  ///< seconds on the device
     /// The same, on a CPU by processor time of all its units, which other programs do not lengthen.

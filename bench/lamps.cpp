@@ -87,7 +87,7 @@ void compare(Session& session, const std::string& name, Scene scene) {
     std::uint32_t spp = 4;
     const int rounds = session.rounds(7);
     for (int round = -1; round < rounds; ++round) {
-        const auto seed = static_cast<std::uint64_t>(round + 1);
+        const auto seed = static_cast<std::uint64_t>(round) + 1;
         const double seconds = with.round(pixels, seed, spp, round >= 0);
         without.round(pixels, seed, spp, round >= 0);
         if (round < 0) spp = static_cast<std::uint32_t>(std::clamp((session.options().quick ? 0.1 : 0.5) * spp / seconds, 2.0, 4096.0));

@@ -146,7 +146,7 @@ struct Choice {
 std::vector<Choice> choices(const std::string& scene, bool flights) {
     std::vector<Choice> all;
     for (const Method& m : flights ? strategies() : estimators()) {
-        const bool either = flights ? m.program == STRATEGY_DECOMPOSITION : m.program == TRANSMITTANCE_ANALYTIC;
+        const bool either = m.name == std::string(flights ? "decomposition" : "analytic");
         // Estimates by null collisions look at one primitive at a time: the width changes nothing. Flights go side by side.
         const bool has_width = flights || (!m.null_collisions && m.program != TRANSMITTANCE_BINARY);
         for (const char* accelerator : either ? std::vector<const char*>{"cells", "bvh"} : std::vector<const char*>{"auto"})

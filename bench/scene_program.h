@@ -11,7 +11,7 @@
 namespace clume::bench {
 
 struct SceneProgram {
-    SceneProgram(Session& session, const char* root, const DeviceScene& scene, ProgramOptions options)
+    SceneProgram(Session& session, const char* root, const DeviceScene& scene, const ProgramOptions& options)
         : queue(session.device()), program(build_program(queue, root, options)), buffers(queue, scene) {}
 
     Queue queue;

@@ -38,7 +38,7 @@ public:
         : Buffer(queue, std::span<const T>(data), flags) {}
     Buffer(Buffer&&) noexcept = default;
     /// By exchange: what was held is released by a destructor, which a device that fails even then cannot make throw.
-    Buffer& operator=(Buffer&& other) noexcept {
+    Buffer& operator=(Buffer&& other) noexcept {  // NOLINT(bugprone-exception-escape): only nothing is released amid a swap
         Buffer old(std::move(other));
         std::swap(queue_, old.queue_);
         std::swap(label_, old.label_);

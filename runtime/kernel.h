@@ -23,7 +23,7 @@ void set_raw_arg(const Queue& queue, cl::Kernel& kernel, unsigned index, std::si
 template <class T>
 void set_arg(const Queue& queue, cl::Kernel& kernel, unsigned index, const Buffer<T>& buffer) {
     const cl_mem handle = buffer.memory()();
-    set_raw_arg(queue, kernel, index, sizeof(handle), &handle);
+    set_raw_arg(queue, kernel, index, sizeof(cl_mem), &handle);
 }
 
 /// A value of exactly the kernel's type: cl_uint, cl_float4, a struct of layout.h.

@@ -67,9 +67,10 @@ ProgramOptions& ProgramOptions::define(std::string name, long long value) {
 std::string ProgramOptions::text() const {
     std::string text = optimised ? "-cl-std=CL1.2" : "-cl-std=CL1.2 -cl-opt-disable";
     for (const auto& [name, value] : defines) {
-        if ((name + value).find_first_of(" \t\n\"'\\;") != std::string::npos || name.empty())
-            throw std::invalid_argument("not a usable define: " + name + "=" + value);
-        text += " -D" + name + "=" + value;
+        std::string both = name;
+        both.append("=").append(value);
+        if (both.find_first_of(" \t\n\"'\\;") != std::string::npos || name.empty()) throw std::invalid_argument("not a usable define: " + both);
+        text.append(" -D").append(both);
     }
     return text;
 }
