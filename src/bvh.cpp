@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kBins = 16;
 constexpr std::uint32_t kLeaf = CLUME_GROUP_SIZE;
+constexpr std::uint32_t leaves_of(std::uint32_t count) { return (count + kLeaf - 1) / kLeaf; }
 
 Box empty_box() { return {glm::dvec3(1e300), glm::dvec3(-1e300)}; }
 
@@ -114,7 +115,7 @@ struct Builder {
             for (std::size_t b = kBins - 1; b > 0; --b) {
                 box.grow(boxes[b].lo, boxes[b].hi);
                 n += counts[b];
-                right_cost[b] = box.half_area() * ((n + kLeaf - 1) / kLeaf);
+                right_cost[b] = box.half_area() * leaves_of(n);
             }
             box = {};
             n = 0;
@@ -124,7 +125,7 @@ struct Builder {
                 box.grow(boxes[b].lo, boxes[b].hi);
                 n += counts[b];
                 if (n == 0 || n == count) continue;
-                const double cost = box.half_area() * ((n + kLeaf - 1) / kLeaf) + right_cost[b + 1];
+                const double cost = box.half_area() * leaves_of(n) + right_cost[b + 1];
                 if (best < 0 || cost < best_cost) best = static_cast<int>(b), best_cost = cost;
             }
             if (best >= 0) {

@@ -29,7 +29,7 @@ void colour(Stops stops, double t, std::uint8_t* out) {
     for (int c = 0; c < 3; ++c) {
         const int shift = 16 - 8 * c;
         const double a = (stops[i] >> shift) & 255u, b = (stops[i + 1] >> shift) & 255u;
-        out[c] = static_cast<std::uint8_t>(a + (b - a) * f + 0.5);
+        out[c] = static_cast<std::uint8_t>(std::lround(a + (b - a) * f));
     }
 }
 

@@ -35,7 +35,8 @@ double add_environment(const Light& light, DeviceScene& out, device::LightInfo& 
     std::vector<double> weight(n);
     double total = 0;
     for (std::size_t i = 0; i < n; ++i) {
-        const auto row = static_cast<double>(i / w);
+        const std::size_t whole_rows = i / w;
+        const auto row = static_cast<double>(whole_rows);
         // sin a − sin b = 2 cos((a + b)/2) sin((a − b)/2), which cancels nothing at the poles.
         const double solid_angle = 4 * pi / static_cast<double>(w) * std::cos(pi * (0.5 - (row + 0.5) / static_cast<double>(h))) * std::sin(pi * 0.5 / static_cast<double>(h));
         const glm::dvec3 rgb = glm::dvec3(light.image.rgb[3 * i], light.image.rgb[3 * i + 1], light.image.rgb[3 * i + 2]) * light.scale;

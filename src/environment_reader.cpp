@@ -96,7 +96,7 @@ EnvironmentImage read_exr(const std::string& name, std::string_view bytes) {
     Imf::FrameBuffer frame;
     const auto slice = [&](const char* channel, std::size_t offset) {
         frame.insert(channel,
-                     Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(base + static_cast<std::intptr_t>(offset * sizeof(float))),
+                     Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(base + static_cast<std::intptr_t>(offset * sizeof(float))),  // NOLINT(performance-no-int-to-ptr)
                                 x_stride, y_stride));
     };
     if (rgb) {

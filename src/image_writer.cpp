@@ -80,7 +80,7 @@ std::uint8_t encode_srgb(double linear) {
     if (!(linear > 0)) return 0;
     if (linear >= 1) return 255;
     const double encoded = linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-    return static_cast<std::uint8_t>(encoded * 255 + 0.5);
+    return static_cast<std::uint8_t>(std::lround(encoded * 255));
 }
 
 void write_exr(const std::filesystem::path& path, const RenderImage& image, const ImageMetadata& metadata) {

@@ -66,7 +66,7 @@ Phase read_phase(const SectionReader& medium) {
 
 std::filesystem::path find_asset(const SectionReader& section, std::string_view key, const std::filesystem::path& folder) {
     const std::string name = section.text(key);
-    const std::filesystem::path path = folder / name;
+    std::filesystem::path path = folder / name;
     std::error_code error;
     const auto status = std::filesystem::status(path, error);
     if (!std::filesystem::exists(status))
