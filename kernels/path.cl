@@ -8,7 +8,7 @@
 
 // Whether a path may scatter at `depth`.
 #if CLUME_DEPTH_LIMIT
-#define LAMP_DEPTH(depth) ((int)(depth) < params->max_depth)
+#define LAMP_DEPTH(depth) ((depth) < (uint)params->max_depth)  // a negative one is none
 #else
 #define LAMP_DEPTH(depth) true
 #endif

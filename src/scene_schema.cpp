@@ -165,7 +165,6 @@ std::string type_words(const KeySpec& spec) {
         case T::boolean:
             return "true or false";
         case T::string:
-            return "a string";
         case T::choice:
             return "a string";
         case T::vec3:

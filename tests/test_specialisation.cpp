@@ -27,12 +27,12 @@ device::float4 row(const glm::dvec3& v, float w) {
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), w};
 }
 
-/// The same scene for a program that has everything in it: only the strategy, the accelerator and the sampled kinds of light
-/// stay, since these are the method, not a saving.
+/// The same scene for a program that has everything in it: only the strategy, the accelerator, the sampled kinds of light
+/// and those with medium around them stay, since these are the method, not a saving.
 DeviceScene generalised(const Scene& scene, DeviceScene device) {
     std::vector<std::pair<std::string, std::string>> kept;
     for (const auto& define : device.defines)
-        for (const char* name : {"CLUME_STRATEGY", "CLUME_ACCEL", "CLUME_BVH_STACK", "CLUME_NEE", "CLUME_HITS", "CLUME_LANES"})
+        for (const char* name : {"CLUME_STRATEGY", "CLUME_ACCEL", "CLUME_BVH_STACK", "CLUME_NEE", "CLUME_HITS", "CLUME_LAMPS", "CLUME_LANES"})
             if (define.first == name) kept.push_back(define);
     device.defines = kept;
     device.shading.clear();
