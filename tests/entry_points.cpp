@@ -110,7 +110,7 @@ Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t cou
         keep(out, std::string("probe_math ") + d.name, probe.math(d.f, x, y));
     }
 
-    TestRandom random(11), depths(12);
+    TestRandom random(11), depths(12), lamps(13);
     std::vector<Probe::Words> counters(count), keys(count);
     for (std::size_t i = 0; i < count; ++i)
         for (int k = 0; k < 4; ++k) counters[i].v[k] = random.word(), keys[i].v[k] = random.word();
@@ -122,9 +122,9 @@ Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t cou
     std::vector<Probe::LampView> views;
     std::vector<float> places;
     for (std::size_t i = 0; i < count; ++i) {
-        const auto t0 = static_cast<float>(random.uniform(0, 2));
-        views.push_back({static_cast<float>(random.uniform(-1, 3)), static_cast<float>(random.spread(1e-6, 2)), t0, t0 + static_cast<float>(random.spread(1e-3, 3))});
-        places.push_back(static_cast<float>(random.uniform(0, 1)));
+        const auto t0 = static_cast<float>(lamps.uniform(0, 2));
+        views.push_back({static_cast<float>(lamps.uniform(-1, 3)), static_cast<float>(lamps.spread(1e-6, 2)), t0, t0 + static_cast<float>(lamps.spread(1e-3, 3))});
+        places.push_back(static_cast<float>(lamps.uniform(0, 1)));
     }
     keep(out, "probe_lamp", probe.lamp_places(views, places));
 

@@ -152,15 +152,15 @@ cl_kernel CL_API_CALL create_kernel(cl_program program, const char* name, cl_int
 cl_int launch_endless(cl_command_queue queue, cl_event* event) {
     cl_context context = nullptr;
     cl_device_id id = nullptr;
-    real->clGetCommandQueueInfo(queue, CL_QUEUE_CONTEXT, sizeof context, &context, nullptr);
-    real->clGetCommandQueueInfo(queue, CL_QUEUE_DEVICE, sizeof id, &id, nullptr);
+    real->clGetCommandQueueInfo(queue, CL_QUEUE_CONTEXT, sizeof(cl_context), &context, nullptr);
+    real->clGetCommandQueueInfo(queue, CL_QUEUE_DEVICE, sizeof(cl_device_id), &id, nullptr);
     const char* text = "__kernel void endless(volatile __global uint* p) { while (p[0] == 0) p[1] += 1; }";
     cl_program program = real->clCreateProgramWithSource(context, 1, &text, nullptr, nullptr);
     real->clBuildProgram(program, 1, &id, "", nullptr, nullptr);
     cl_kernel kernel = real->clCreateKernel(program, "endless", nullptr);
     cl_uint zeros[2] = {0, 0};
     cl_mem memory = real->clCreateBuffer(context, CL_MEM_COPY_HOST_PTR, sizeof zeros, zeros, nullptr);
-    real->clSetKernelArg(kernel, 0, sizeof memory, &memory);
+    real->clSetKernelArg(kernel, 0, sizeof(cl_mem), &memory);
     const size_t one = 1;
     return real->clEnqueueNDRangeKernel(queue, kernel, 1, nullptr, &one, &one, 0, nullptr, event);
 }
@@ -184,7 +184,7 @@ cl_int CL_API_CALL enqueue_kernel(cl_command_queue queue, cl_kernel kernel, cl_u
             if (d->lost) return lost_code;
         }
     }
-    while (blocked) pause();
+    while (blocked) pause();  // NOLINT(bugprone-infinite-loop): that is the fault
     if (endless) return launch_endless(queue, event);
     return real->clEnqueueNDRangeKernel(queue, kernel, dimensions, offset, global, local, waits, wait_list, event);
 }

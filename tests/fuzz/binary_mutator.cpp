@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <cstring>
 
-extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t most);
+extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t most);  // NOLINT(readability-identifier-naming): libFuzzer's
 
 /// Such files are mostly tables of zeros, in which a change means little: every other time, change bytes near one that isn't 0.
-extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most, unsigned seed) {
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most, unsigned seed) {  // NOLINT(readability-identifier-naming): libFuzzer's
     constexpr std::size_t window = 32;
     if (size <= 4 * window || seed % 2 == 0) return LLVMFuzzerMutate(data, size, most);
     std::size_t at = 0;

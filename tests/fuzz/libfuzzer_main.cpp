@@ -27,13 +27,13 @@ void on_free(const volatile void* pointer) {
 
 }  // namespace
 
-extern "C" int LLVMFuzzerInitialize(int*, char***) {
+extern "C" int LLVMFuzzerInitialize(int*, char***) {  // NOLINT(readability-identifier-naming): libFuzzer's
     target.run("");  // what is made once is no input's doing
     __sanitizer_install_malloc_and_free_hooks(on_malloc, on_free);
     return 0;
 }
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {  // NOLINT(readability-identifier-naming): libFuzzer's
     peak = held = 0;
     try {
         target.run({reinterpret_cast<const char*>(data), size});
