@@ -89,9 +89,9 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     sums_add(sums + (size_t)item * FILM_WORDS, sum, resume);
 }
 #else
-/// A work-item's rows of sums, lane i being row i: their pixels, and the next sample of each.
+/// A work-item's rows of sums, lane i being row i (`own`): their pixels, and the next sample of each.
 typedef struct {
-    vuint next, pixel;
+    vuint own, next, pixel;
     vfloat x, y;  // the pixel's lower corner on the film
 } Rows;
 
@@ -103,8 +103,7 @@ static vint lanes_assign(Lanes* l, Rows* rows, vint idle, uint splits, uint samp
     LANE_SET(l->draws.pixel, rows->pixel, begun);
     LANE_SET(l->film_x, rows->x, begun);
     LANE_SET(l->film_y, rows->y, begun);
-    for (int i = 0; i < CLUME_WIDTH; ++i)
-        if (LANE_OF(int, begun, i)) ((uint*)&l->row)[i] = (uint)i;
+    LANE_SET(l->row, rows->own, begun);
     LANE_SET(rows->next, rows->next + splits, begun);
     if (!vany(rows->next < (vuint)sample_end)) return begun;
     for (int i = 0; i < CLUME_WIDTH; ++i) {
@@ -166,11 +165,12 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     const uint count = min((uint)CLUME_WIDTH, pixel_count * splits - first_row);
     Rows rows;
     rows.next = (vuint)sample_end;
-    rows.pixel = (vuint)0u;
+    rows.own = rows.pixel = (vuint)0u;
     rows.x = rows.y = (vfloat)0.0f;
     vint usable = (vint)0;  // a lane without a row has nowhere to leave its path
     for (uint i = 0; i < count; ++i) {
         ((int*)&usable)[i] = -1;
+        ((uint*)&rows.own)[i] = i;
         const uint pixel = pixels[pixel_first + (first_row + i) % pixel_count], y = pixel / params->film_width;
         ((uint*)&rows.next)[i] = resume ? states[first_row + i].next : sample_begin + (first_row + i) / pixel_count;
         ((uint*)&rows.pixel)[i] = pixel;

@@ -31,9 +31,19 @@ static void product_v(vuint x, uint factor, vuint* high, vuint* low) {
 #if CLUME_WIDTH == 1
     product_s(x, factor, high, low);
 #else
-    const vpairs both = as_vpairs(x), even = (both & (vpairs)0xffffffffu) * (vpairs)factor, odd = (both >> (vpairs)32) * (vpairs)factor;
-    *high = pairs_as_vuint((even >> (vpairs)32) | (odd & (vpairs)0xffffffff00000000u));
-    *low = pairs_as_vuint((even & (vpairs)0xffffffffu) | (odd << (vpairs)32));
+    // Lanes picked one by one: from shifts and masks compilers make 64-bit products of three instructions.
+    const vpairs both = as_vpairs(x);
+    const vuint e = pairs_as_vuint((both & (vpairs)0xffffffffu) * (vpairs)factor), o = pairs_as_vuint((both >> (vpairs)32) * (vpairs)factor);
+#if CLUME_WIDTH == 16
+    *high = (vuint)(e.s1, o.s1, e.s3, o.s3, e.s5, o.s5, e.s7, o.s7, e.s9, o.s9, e.sb, o.sb, e.sd, o.sd, e.sf, o.sf);
+    *low = (vuint)(e.s0, o.s0, e.s2, o.s2, e.s4, o.s4, e.s6, o.s6, e.s8, o.s8, e.sa, o.sa, e.sc, o.sc, e.se, o.se);
+#elif CLUME_WIDTH == 8
+    *high = (vuint)(e.s1, o.s1, e.s3, o.s3, e.s5, o.s5, e.s7, o.s7);
+    *low = (vuint)(e.s0, o.s0, e.s2, o.s2, e.s4, o.s4, e.s6, o.s6);
+#else
+    *high = (vuint)(e.s1, o.s1, e.s3, o.s3);
+    *low = (vuint)(e.s0, o.s0, e.s2, o.s2);
+#endif
 #endif
 }
 
