@@ -151,7 +151,6 @@ typedef CONCAT(ulong, CLUME_HALF_WIDTH) vpairs;  // the bits of a vuint, two lan
 #define as_vpairs(x) CONCAT(as_ulong, CLUME_HALF_WIDTH)(x)
 #define pairs_as_vuint(x) CONCAT(as_uint, CLUME_WIDTH)(x)
 #define vselect(a, b, mask) select((a), (b), (mask))
-#define vany(mask) any(mask)
 #define as_vint(x) CONCAT(as_int, CLUME_WIDTH)(x)
 #define as_vuint(x) CONCAT(as_uint, CLUME_WIDTH)(x)
 #define as_vfloat(x) CONCAT(as_float, CLUME_WIDTH)(x)
@@ -160,6 +159,19 @@ typedef CONCAT(ulong, CLUME_HALF_WIDTH) vpairs;  // the bits of a vuint, two lan
 #define to_vuint(x) CONCAT(convert_uint, CLUME_WIDTH)(x)
 #define to_vulong(x) CONCAT(convert_ulong, CLUME_WIDTH)(x)
 #define vload_row(p) (*(__global const vfloat*)(p))
+/// Whether any lane of a comparison's result is set. By halves: `any` looks at one lane after the other on some devices.
+static int vany(vint mask) {
+#if CLUME_WIDTH == 16
+    const int8 m8 = mask.lo | mask.hi;
+    const int4 m4 = m8.lo | m8.hi;
+#elif CLUME_WIDTH == 8
+    const int4 m4 = mask.lo | mask.hi;
+#else
+    const int4 m4 = mask;
+#endif
+    const int2 m2 = m4.lo | m4.hi;
+    return (m2.x | m2.y) != 0;
+}
 #endif
 
 #define CLUME_INFINITY 1e30f  // "never" along a ray; finite, so that sums and products of it stay ordered

@@ -35,8 +35,11 @@ static int lanes_count(vint mask) {
 /// primitive_kernel of each lane's primitive at its t.
 static vfloat lanes_kernel(const LaneFlights* f, vuint primitive, __global const Primitive* primitives) {
     __global const uint4* records = (__global const uint4*)primitives;
+    const vuint record = 4u * primitive;
     vuint q[12];
-    for (int k = 0; k < 3; ++k) lanes_load(records, 4u * primitive + (uint)k, q + 4 * k, q + 4 * k + 1, q + 4 * k + 2, q + 4 * k + 3);
+    lanes_load(records, record, q, q + 1, q + 2, q + 3);
+    lanes_load(records, record + 1u, q + 4, q + 5, q + 6, q + 7);
+    lanes_load(records, record + 2u, q + 8, q + 9, q + 10, q + 11);
     const vfloat x = fma(f->t, f->dx, f->ox) - as_vfloat(q[0]), y = fma(f->t, f->dy, f->oy) - as_vfloat(q[1]), z = fma(f->t, f->dz, f->oz) - as_vfloat(q[2]);
     const vfloat a0 = fma(as_vfloat(q[3]), x, fma(as_vfloat(q[4]), y, as_vfloat(q[5]) * z)), a1 = fma(as_vfloat(q[6]), y, as_vfloat(q[7]) * z), a2 = as_vfloat(q[8]) * z;
     const vfloat r2 = fma(a0, a0, fma(a1, a1, a2 * a2));
@@ -75,7 +78,8 @@ static vint lanes_begin(LaneFlights* f, vfloat t_end, const LaneDraws* r, vint m
 }
 
 /// Flies the lanes in *under_way until no more than `enough` are; those that end are taken out of it, and set *result.
-static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint* result, int enough, uint* violations, SCENE_ARGS) {
+/// *above: −1 per lane for each look-up above its bound.
+static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint* result, int enough, vint* above, SCENE_ARGS) {
     for (;;) {
         // Steps are cheap beside collisions: most lanes are brought to one first.
         vfloat end;
@@ -85,7 +89,7 @@ static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint*
             const vfloat depth = f->majorant * (end - f->t);
             tentative = *under_way & (f->tau < depth);
             const vint stepping = *under_way & ~tentative;
-            if (lanes_count(stepping) * 16 <= lanes_count(*under_way) * CLUME_LANES_STEPPING) break;
+            if (lanes_count(16 * stepping - CLUME_LANES_STEPPING * *under_way) <= 0) break;
             LANE_SET(f->tau, f->tau - depth, stepping);
             const vint left = stepping & ~lanes_next(f, stepping, params, cells);
             LANE_SET(*result, (vint)FLIGHT_ESCAPED, left);
@@ -100,8 +104,7 @@ static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint*
             const vuint primitive = vselect((vuint)0u, vselect(other, own, mine), tentative);
             const vfloat scale = as_vfloat(vselect(scales, scales << (vuint)16u, mine) & (vuint)0xffff0000u);
             const vfloat probability = scale * lanes_kernel(f, primitive, primitives);
-            const vint above = tentative & (probability > (vfloat)1.0f);
-            if (vany(above)) *violations += (uint)lanes_count(above);
+            *above += tentative & (probability > (vfloat)1.0f);
             LANE_SET(f->draw, f->draw + 1u, tentative);
             const vint real = tentative & (uniform_v(f->accept) < probability);
             const vint pause = tentative & ~real & ((f->draw % (vuint)CLUME_FLIGHT_DRAWS) == (vuint)0u);

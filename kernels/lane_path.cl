@@ -25,7 +25,8 @@ typedef struct {
     vfloat light[CLUME_CHANNELS];    // what it adds if it gets through
     vfloat next_x, next_y, next_z;   // direction that the path takes afterwards
 #endif
-    uint violations;
+    vint above;               // −1 per lane for each look-up above its bound by lanes_fly
+    uint violations;          // such look-ups by others
     ulong excess;
 } Lanes;
 

@@ -132,7 +132,7 @@ __kernel void probe_flights(SCENE_ARGS, __global const float4* rays, __global fl
     LaneFlights f;
     vfloat t_end = (vfloat)0.0f;
     vint flying = (vint)0, result = (vint)FLIGHT_ESCAPED, waiting = (vint)0;
-    uint violations = 0;
+    vint above = (vint)0;
     for (;;) {
         for (int i = 0; i < CLUME_WIDTH; ++i) {
             if (LANE_OF(int, flying, i) || LANE_OF(int, waiting, i) || next == last) continue;
@@ -155,7 +155,7 @@ __kernel void probe_flights(SCENE_ARGS, __global const float4* rays, __global fl
         LANE_SET(result, (vint)FLIGHT_ESCAPED, waiting);
         flying |= begun;
         const int busy = lanes_count(flying);
-        if (busy > 0) lanes_fly(&f, &r, &flying, &result, busy * CLUME_LANES_ENOUGH / 16, &violations, SCENE);
+        if (busy > 0) lanes_fly(&f, &r, &flying, &result, busy * CLUME_LANES_ENOUGH / 16, &above, SCENE);
         const vint ended = out_now & ~flying;
         waiting = ended & (result == (vint)FLIGHT_PAUSED);
         for (int i = 0; i < CLUME_WIDTH; ++i) {

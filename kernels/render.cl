@@ -105,9 +105,10 @@ static vint lanes_assign(Lanes* l, Rows* rows, vint idle, uint splits, uint samp
     LANE_SET(l->film_y, rows->y, begun);
     LANE_SET(l->row, rows->own, begun);
     LANE_SET(rows->next, rows->next + splits, begun);
-    if (!vany(rows->next < (vuint)sample_end)) return begun;
+    const vint rest = idle & ~begun;
+    if (!vany(rest) || !vany(rows->next < (vuint)sample_end)) return begun;
     for (int i = 0; i < CLUME_WIDTH; ++i) {
-        if (!LANE_OF(int, idle, i) || LANE_OF(int, begun, i)) continue;
+        if (!LANE_OF(int, rest, i)) continue;
         uint row = 0;
         for (uint k = 1; k < CLUME_WIDTH; ++k)
             if (LANE_OF(uint, rows->next, k) < LANE_OF(uint, rows->next, row)) row = k;
@@ -185,6 +186,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
 #if LANE_SHADOWS
     l.shadow = (vint)0;
 #endif
+    l.above = (vint)0;
     l.violations = 0;
     l.excess = 0;
     for (uint i = 0; resume && i < count; ++i) {
@@ -215,7 +217,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
         waiting &= ~departing;
         if (!vany(out)) break;
         const int busy = lanes_count(l.under_way);
-        if (busy > 0) lanes_fly(&l.flight, &l.draws, &l.under_way, &l.result, tired ? 0 : busy * CLUME_LANES_ENOUGH / 16, &l.violations, SCENE);
+        if (busy > 0) lanes_fly(&l.flight, &l.draws, &l.under_way, &l.result, tired ? 0 : busy * CLUME_LANES_ENOUGH / 16, &l.above, SCENE);
         vint ended = out & ~l.under_way;
         out = l.under_way;
         events += lanes_count(ended);
@@ -230,6 +232,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
         if (vany(collided)) lanes_collide(&l, collided, SCENE);
         waiting |= ended & l.alive;
         const vint over = ended & ~l.alive;
+        if (!vany(over)) continue;
         for (int i = 0; i < CLUME_WIDTH; ++i) {
             if (!LANE_OF(int, over, i)) continue;
             ulong* s = sum + LANE_OF(uint, l.row, i) * FILM_WORDS;
@@ -237,7 +240,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
             s[FILM_ALPHA] += LANE_OF(int, l.alpha, i) ? 1 : 0;
         }
     }
-    sum[FILM_VIOLATIONS] = l.violations;
+    sum[FILM_VIOLATIONS] = l.violations + (uint)lanes_count(l.above);
     sum[FILM_EXCESS] = l.excess;
     if (vany(l.alive) || vany(rows.next < (vuint)sample_end)) atomic_inc(unfinished);
     for (uint i = 0; i < count; ++i) {
