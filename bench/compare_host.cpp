@@ -15,6 +15,7 @@
 #include "bench/rays.h"
 #include "bench/scenes.h"
 #include "bench/sections.h"
+#include "src/pilot.h"
 #include "src/renderer.h"
 #include "tests/reference/host_tracer.h"
 
@@ -88,10 +89,12 @@ void compare_paths(Session& session, const std::string& name, Scene scene, int t
     const reference::HostTracer host(scene, cells);
     const RenderOptions render_options = session.render_options();
     const std::atomic<bool> stop{false};
+    // The method is the one that `clume render` takes.
+    if (const auto pilot = run_pilot(scene, render_options, pilot_folder(), stop)) scene = with_pair(std::move(scene), pilot->rows[pilot->chosen].pair);
     const double target = round_seconds(session), pixels = static_cast<double>(scene.film.width) * scene.film.height;
     std::uint32_t host_spp = 2, spp = 8;
     Side theirs, ours;
-    std::string strategy;
+    std::string method;
     // The first two rounds warm up and find out how many samples fill a round.
     for (int round = -2; round < session.rounds(7); ++round) {
         const auto seed = static_cast<std::uint64_t>(round) + 2;
@@ -104,7 +107,7 @@ void compare_paths(Session& session, const std::string& name, Scene scene, int t
         if (round < 0) {
             host_spp = samples_for(target, image.seconds / host_spp, 2);
             spp = samples_for(target, r.stats.render_s / spp, 4);
-            strategy = r.stats.strategy;
+            method = r.stats.strategy + "/" + r.stats.transmittance;
             continue;
         }
         theirs.add(pixels * host_spp, image.seconds, host_cpu, sample_variance(image.variance, host_spp), mean_value(image.rgb));
@@ -115,9 +118,9 @@ void compare_paths(Session& session, const std::string& name, Scene scene, int t
     const double sigmas = (mean(ours.mean) - mean(theirs.mean)) / deviation;
     const double paths = ratio(theirs.wall_s, ours.wall_s), variance = mean(theirs.variance) / mean(ours.variance), cpu = ratio(theirs.cpu_s, ours.cpu_s);
     session.record(name,
-                   fmt::format("{:14} {:9.3f} {:9.3f} {:7.2f} {:11.4g} {:11.4g} {:10.2f} {:9.3f} {:9.3f} {:7.2f}", name, theirs.mega_per_s(), ours.mega_per_s(), paths,
-                               mean(theirs.variance), mean(ours.variance), paths * variance, theirs.cpu_us(), ours.cpu_us(), cpu * variance),
-                   {{"strategy", strategy}, {"host_cells", static_cast<double>(cells)}, {"host_spp", static_cast<double>(host_spp)}, {"spp", static_cast<double>(spp)},
+                   fmt::format("{:14} {:9.3f} {:9.3f} {:7.2f} {:11.4g} {:11.4g} {:10.2f} {:9.3f} {:9.3f} {:7.2f}  {}", name, theirs.mega_per_s(), ours.mega_per_s(), paths,
+                               mean(theirs.variance), mean(ours.variance), paths * variance, theirs.cpu_us(), ours.cpu_us(), cpu * variance, method),
+                   {{"method", method}, {"host_cells", static_cast<double>(cells)}, {"host_spp", static_cast<double>(host_spp)}, {"spp", static_cast<double>(spp)},
                     {"host_mpaths_s", theirs.mega_per_s()}, {"mpaths_s", ours.mega_per_s()}, {"ratio_paths", paths}, {"host_variance", mean(theirs.variance)},
                     {"variance", mean(ours.variance)}, {"ratio_inverse_efficiency", paths * variance}, {"host_cpu_us_per_path", theirs.cpu_us()},
                     {"cpu_us_per_path", ours.cpu_us()}, {"ratio_inverse_efficiency_cpu", cpu * variance},
@@ -178,10 +181,10 @@ void bench_scenes_section(Session& session) {
                     "An item is a path; ball_long: ball without roulette, as the host; ball_inside, ball_camera: a free flight, from inside the\n"
                     "ball or from the camera over the whole film.\n"
                     "host: plain double-precision delta tracker, cell lists. ratio: paths/s. efficiency: ratio of inverse efficiencies\n"
-                    "(variance of a sample x wall seconds per path); the last three columns are processor microseconds per item and\n"
-                    "the same ratio by processor time. For flights, the share that collides stands where variances stand.\n" +
-                        fmt::format("{:14} {:>9} {:>9} {:>7} {:>11} {:>11} {:>10} {:>9} {:>9} {:>7}", "", "host M/s", "clume M/s", "ratio", "host var", "clume var", "efficiency",
-                                    "host cpu", "clume cpu", "eff cpu"));
+                    "(variance of a sample x wall seconds per path); the last three numbers are processor microseconds per item and\n"
+                    "the same ratio by processor time. For flights, the share that collides stands where variances stand. method: what `clume render` chooses.\n" +
+                        fmt::format("{:14} {:>9} {:>9} {:>7} {:>11} {:>11} {:>10} {:>9} {:>9} {:>7}  {}", "", "host M/s", "clume M/s", "ratio", "host var", "clume var", "efficiency",
+                                    "host cpu", "clume cpu", "eff cpu", "method"));
     const auto threads = [&] { return static_cast<int>(session.device().type == "cpu" ? session.device().compute_units : std::thread::hardware_concurrency()); };
     for (const std::string& name : scene_names())
         if (session.wants(name)) compare_paths(session, name, bench_scene(name), threads());

@@ -161,7 +161,7 @@ std::string build_structures(const Structures& wanted, const BvhTree& tree, std:
         o.costs.density_share = densities ? 1 : 0;
         o.costs.chord_share = wanted.cell_groups && !densities ? 1 : 0;
         o.control = wanted.references && out.transmittance == "residual-ratio";
-        o.max_references = std::max<std::size_t>(std::size_t{2} << 20, 8 * n);
+        o.max_references = std::max<std::size_t>(std::size_t{2} << 20, 6 * n);
         if (out.bound == "grid" && (wanted.references || densities)) {
             o.max_levels = 0;
             o.roots = majorant_grid;

@@ -55,7 +55,7 @@ double HostGrid::at_lattice(const glm::dvec3& p) const {
         if (!(p[k] >= lower_[k] && p[k] <= upper_[k])) return 0;
     const double x = p.x - first_.x, y = p.y - first_.y, z = p.z - first_.z;
     if (nearest_) {
-        const auto of = [](double v, int n) { return std::min(static_cast<int>(v + 0.5), n - 2); };
+        const auto of = [](double v, int n) { return std::min(static_cast<int>(std::lround(v)), n - 2); };
         return factor_ * static_cast<double>(sample(of(x, size_.x), of(y, size_.y), of(z, size_.z)));
     }
     const int i = std::min(static_cast<int>(x), size_.x - 2), j = std::min(static_cast<int>(y), size_.y - 2), k = std::min(static_cast<int>(z), size_.z - 2);
@@ -110,7 +110,7 @@ std::vector<double> HostGrid::cuts(const glm::dvec3& o, const glm::dvec3& d, dou
     for (int k = 0; k < 3; ++k) {
         if (b[k] == 0) continue;
         const double p = a[k] + t0 * b[k] - shift, q = a[k] + t1 * b[k] - shift;
-        for (double plane = std::ceil(std::min(p, q)); plane <= std::max(p, q); plane += 1) {
+        for (double plane = std::ceil(std::min(p, q)); plane <= std::max(p, q); plane += 1) {  // NOLINT(clang-analyzer-security.FloatLoopCounter): whole numbers
             const double t = (plane + shift - a[k]) / b[k];
             if (t > t0 && t < t1) all.push_back(t);
         }
