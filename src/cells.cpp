@@ -127,7 +127,7 @@ RootChoice choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree
     const std::size_t stride = std::max<std::size_t>(1, n / 20000), samples = std::min<std::size_t>(n, 128);
     RootChoice best{longest, std::numeric_limits<double>::max()};
     double best_total = std::numeric_limits<double>::max();
-    for (double size = longest; size > longest / 1500; size *= 0.84) {  // NOLINT(clang-analyzer-security.FloatLoopCounter): no count
+    for (double size = longest; size > longest / 1500; size *= 0.84) {
         const glm::dvec3 counts = glm::ceil(extent / size);
         const double cells = counts.x * counts.y * counts.z;
         if (cells > static_cast<double>(kMaxRoots)) break;

@@ -110,7 +110,7 @@ std::vector<double> HostGrid::cuts(const glm::dvec3& o, const glm::dvec3& d, dou
     for (int k = 0; k < 3; ++k) {
         if (b[k] == 0) continue;
         const double p = a[k] + t0 * b[k] - shift, q = a[k] + t1 * b[k] - shift;
-        for (double plane = std::ceil(std::min(p, q)); plane <= std::max(p, q); plane += 1) {  // NOLINT(clang-analyzer-security.FloatLoopCounter): whole numbers
+        for (double plane = std::ceil(std::min(p, q)); plane <= std::max(p, q); plane += 1) {
             const double t = (plane + shift - a[k]) / b[k];
             if (t > t0 && t < t1) all.push_back(t);
         }
