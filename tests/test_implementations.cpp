@@ -98,12 +98,13 @@ TEST_CASE("Implementations.MethodsGiveTheSameBitsAtEveryWidth", "[.deep]") {
 
 TEST_CASE("Implementations.SpecialisedProgramsGiveTheSameBits", "[.][implementations]") {
     Outputs reference;
-    for (const DeviceInfo& device : one_of_each()) {
-        const Outputs got = run_method(device, 0, hardly_anything(), {"delta"}, interprets(device) ? 0 : kMany);
-        if (reference.empty()) reference = got;
-        INFO(device.label());
-        check_same_words(reference, got);
-    }
+    for (const DeviceInfo& device : one_of_each())
+        for (const int width : kAllWidths) {  // its paths go side by side
+            const Outputs got = run_method(device, width, hardly_anything(), {"delta"}, interprets(device) ? 0 : kMany);
+            if (reference.empty()) reference = got;
+            INFO(device.label() << ", width " << width);
+            check_same_words(reference, got);
+        }
 }
 
 TEST_CASE("Implementations.ShareARender", "[.][implementations]") {
@@ -166,7 +167,7 @@ TEST_CASE("EntryPoints.AreAllRun", "[.][entry]") {
     Outputs all = run_building_blocks(device, 4, 8);
     all.merge(run_building_blocks(device, 16, 8));
     for (const MethodCase& c : method_cases()) all.merge(run_method(device, 4, scene_of(c), c.pair, 8));
-    all.merge(run_method(device, 1, hardly_anything(), {"delta"}, 8));
+    for (const int width : {1, 4}) all.merge(run_method(device, width, hardly_anything(), {"delta"}, 8));
     std::size_t kernels = 0;
     for (const EmbeddedFile& file : embedded_kernels()) {
         const std::string text(file.text);
