@@ -130,6 +130,7 @@ __kernel void probe_flights(SCENE_ARGS, __global const float4* rays, __global fl
     const LaneDraws draws = {(vuint)sample, (vuint)0u, (vuint)1u, (uint2)(params->seed_lo, params->seed_hi)};
     LaneDraws r = draws;
     LaneFlights f;
+    for (uint i = 0; i < sizeof(LaneFlights) / sizeof(uint); ++i) ((uint*)&f)[i] = 0;  // idle lanes are computed with, too
     vfloat t_end = (vfloat)0.0f;
     vint flying = (vint)0, result = (vint)FLIGHT_ESCAPED, waiting = (vint)0;
     vint above = (vint)0;

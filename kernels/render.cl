@@ -179,6 +179,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
         ((float*)&rows.y)[i] = (float)y - params->film_cy;
     }
     Lanes l;
+    for (uint i = 0; i < sizeof(Lanes) / sizeof(uint); ++i) ((uint*)&l)[i] = 0;  // idle lanes are computed with, too
     l.alive = l.alpha = l.under_way = (vint)0;
     l.result = (vint)FLIGHT_ESCAPED;
     l.row = l.draws.sample = l.draws.pixel = l.draws.depth = (vuint)0u;
