@@ -245,13 +245,8 @@ __kernel void walk_segments(SCENE_ARGS, __global const float4* rays, __global fl
         int next = 0;
         active.count = 0;
         while (t < all.window) {
-            for (; next < all.chords.count && LANE(all.chords.t_in, all.order[next]) <= t; ++next) active_add(&active, &all.chords, all.order[next]);
-            const float entry = next < all.chords.count ? min_s(LANE(all.chords.t_in, all.order[next]), all.window) : all.window;
-            if (active.count == 0) {
-                t = entry;
-                continue;
-            }
-            const float end = min_s(entry, active_first_exit(&active));
+            float end;
+            if (!segment_begin(&all, &active, &next, &t, &end)) continue;
             sum += (float4)(1.0f, (float)((active.count + 15) / 16), (float)active.count, active_sum(&active, 0, t, end));
             t = end;
             active_expire(&active, t);
@@ -269,17 +264,8 @@ __kernel void count_ray(SCENE_ARGS, __global const float4* rays, __global ulong*
     const float t_end = rays[2 * i].w;
     const Draws draws = {0, i, 1, (uint2)(params->seed_lo, params->seed_hi)};
     Flight f;
-    work_clear(&f.work);
-    f.t = 0.0f;
-    f.draw = 0;
-    f.primitive = CLUME_NO_PRIMITIVE;
-    f.violations = 0;
-    f.excess = 0;
-    if (what & 1u) {
-        int result;
-        do result = flight_sample(o, d, t_end, &f, &draws, SCENE);
-        while (result == FLIGHT_PAUSED);
-    }
+    flight_clear(&f);
+    if (what & 1u) flight_to_end(o, d, t_end, &f, &draws, SCENE);
     // The estimate is kept where no count is: a compiler may not leave it out.
     const float estimate = what & 8u ? transmittance_estimate(o, d, t_end, draw_bits(&draws, 1).x, &draws, &f, SCENE) : 1.0f;
     for (int k = 0; k < WORK_KINDS; ++k) work[(WORK_KINDS + 1) * (size_t)i + (size_t)k] = f.work.n[k];

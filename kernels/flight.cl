@@ -34,3 +34,11 @@ static int flight_sample(float3 o, float3 d, float t_end, Flight* f, const Draws
 #endif
     return result;
 }
+
+/// The same, however often the mixture's flight pauses.
+static int flight_to_end(float3 o, float3 d, float t_end, Flight* f, const Draws* r, SCENE_ARGS) {
+    int result;
+    do result = flight_sample(o, d, t_end, f, r, SCENE);
+    while (result == FLIGHT_PAUSED);
+    return result;
+}

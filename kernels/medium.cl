@@ -67,6 +67,15 @@ typedef struct {
     Work work;
 } Flight;
 
+static void flight_clear(Flight* f) {
+    f->t = 0.0f;
+    f->draw = 0;
+    f->primitive = CLUME_NO_PRIMITIVE;
+    f->violations = 0;
+    f->excess = 0;
+    work_clear(&f->work);
+}
+
 /// Extinction at p of the groups [first, first + count): lanes add up over the groups, then by fixed pairs.
 static float groups_density(uint first, uint count, float3 p, SCENE_ARGS) {
     vfloat sum[CLUME_PARTS];

@@ -97,20 +97,10 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
     float4 r = (float4)(CLUME_INFINITY, as_float(CLUME_NO_PRIMITIVE), 1.0f, 0.0f);
     Draws draws = {sample, i, 1, (uint2)(params->seed_lo, params->seed_hi)};
     Flight f;
-    work_clear(&f.work);
-    f.t = 0.0f;
-    f.draw = 0;
-    f.primitive = CLUME_NO_PRIMITIVE;
-    f.violations = 0;
-    f.excess = 0;
-    if (what & 1u) {
-        int result;
-        do result = flight_sample(o, d, t_end, &f, &draws, SCENE);
-        while (result == FLIGHT_PAUSED);
-        if (result == FLIGHT_COLLIDED) {
-            r.x = f.t;
-            r.y = as_float(f.primitive);
-        }
+    flight_clear(&f);
+    if ((what & 1u) && flight_to_end(o, d, t_end, &f, &draws, SCENE) == FLIGHT_COLLIDED) {
+        r.x = f.t;
+        r.y = as_float(f.primitive);
     }
     const float roulette = what & 4u ? exponential_s(draw_bits(&draws, 1).x) : CLUME_INFINITY;
     if (what & 8u) r.z = transmittance_estimate(o, d, t_end, draw_bits(&draws, 1).x, &draws, &f, SCENE);

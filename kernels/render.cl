@@ -25,10 +25,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     Path p;
     p.sample = sample_begin + item / pixel_count;
     p.flags = 0;
-    p.flight.primitive = CLUME_NO_PRIMITIVE;
-    p.flight.violations = 0;
-    p.flight.excess = 0;
-    work_clear(&p.flight.work);
+    flight_clear(&p.flight);
     if (resume) {
         const PathState s = states[item];
         p.o = s.origin.xyz;

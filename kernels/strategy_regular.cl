@@ -72,6 +72,19 @@ static int regular_streamed(float3 o, float3 d, float t, float t_end, float tau,
     return FLIGHT_COLLIDED;
 }
 
+/// Takes the chords that have begun by *t, from the *next on, into `active`. True: the segment from *t ends at *end. False: no
+/// chord lies at *t, which moves on to where one begins, or to the window's end.
+static bool segment_begin(const Gathering* all, Chords* active, int* next, float* t, float* end) {
+    for (; *next < all->chords.count && LANE(all->chords.t_in, all->order[*next]) <= *t; ++*next) active_add(active, &all->chords, all->order[*next]);
+    const float entry = *next < all->chords.count ? min_s(LANE(all->chords.t_in, all->order[*next]), all->window) : all->window;
+    if (active->count == 0) {
+        *t = entry;
+        return false;
+    }
+    *end = min_s(entry, active_first_exit(active));
+    return true;
+}
+
 static int flight_regular(float3 o, float3 d, float t_end, Flight* f, const Draws* r, SCENE_ARGS) {
     const uint4 bits = draw_bits(r, 0);
     COUNT(&f->work, WORK_DRAWS, 1);
@@ -85,13 +98,8 @@ static int flight_regular(float3 o, float3 d, float t_end, Flight* f, const Draw
         active.count = 0;
         int next = 0;
         while (t < all.window) {
-            for (; next < all.chords.count && LANE(all.chords.t_in, all.order[next]) <= t; ++next) active_add(&active, &all.chords, all.order[next]);
-            const float entry = next < all.chords.count ? min_s(LANE(all.chords.t_in, all.order[next]), all.window) : all.window;
-            if (active.count == 0) {
-                t = entry;
-                continue;
-            }
-            const float end = min_s(entry, active_first_exit(&active));
+            float end;
+            if (!segment_begin(&all, &active, &next, &t, &end)) continue;
             COUNT(&f->work, WORK_SEGMENTS, 1);
             const float depth = active_sum(&active, 0, t, end);
             if (tau < depth) {
