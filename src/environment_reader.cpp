@@ -6,7 +6,6 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
-#include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <fmt/format.h>
 
@@ -14,11 +13,10 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <string_view>
 
 #include "src/error.h"
-#include "src/exr_header.h"
+#include "src/exr_input.h"
 #include "src/input_file.h"
 #include "src/json_reader.h"
 #include "src/memory_bound.h"
@@ -45,27 +43,8 @@ EnvironmentImage sized_image(const std::string& name, std::int64_t width, std::i
     return image;
 }
 
-class MemoryStream : public Imf::IStream {
-  public:
-    MemoryStream(const std::string& name, std::string_view bytes) : Imf::IStream(name.c_str()), bytes_(bytes) {}
-    bool read(char out[], int n) override {
-        if (n < 0 || static_cast<std::size_t>(n) > bytes_.size() - at_) throw std::runtime_error("the file is cut short");
-        std::memcpy(out, bytes_.data() + at_, static_cast<std::size_t>(n));
-        at_ += static_cast<std::size_t>(n);
-        return at_ < bytes_.size();
-    }
-    uint64_t tellg() override { return at_; }
-    void seekg(uint64_t position) override { at_ = std::min<std::size_t>(position, bytes_.size()); }
-
-  private:
-    std::string_view bytes_;
-    std::size_t at_ = 0;
-};
-
-EnvironmentImage read_exr(const std::string& name, std::string_view bytes) {
-    // What a header may ask for, before the library allocates by it.
-    check_exr_headers(name, bytes);
-    MemoryStream stream(name, bytes);
+EnvironmentImage read_exr(const std::string& name, const std::string& bytes) {
+    ExrInput stream(name, bytes);
     Imf::InputFile file(stream);
     const Imf::Header& header = file.header();
     const Imath::Box2i data = header.dataWindow(), display = header.displayWindow();
@@ -225,11 +204,12 @@ class HdrReader {
 }  // namespace
 
 EnvironmentImage read_environment(const std::filesystem::path& path) {
-    const std::string name = path.string(), bytes = read_file_bytes(path);
+    const std::string name = path.string();
+    std::string bytes = read_file_bytes(path);
     EnvironmentImage image;
     try {
         if (bytes.starts_with("\x76\x2f\x31\x01"))
-            image = read_exr(name, bytes);
+            image = read_exr(name, checked_exr(name, std::move(bytes)));
         else if (bytes.starts_with("#?RADIANCE") || bytes.starts_with("#?RGBE"))
             image = HdrReader(name, bytes).run();
         else

@@ -19,7 +19,7 @@
 #include <string_view>
 
 #include "src/error.h"
-#include "src/exr_header.h"
+#include "src/exr_input.h"
 #include "src/input_file.h"
 
 namespace clume {
@@ -113,8 +113,9 @@ void write_exr(const std::filesystem::path& path, const RenderImage& image, cons
 
 RenderImage read_exr(const std::filesystem::path& path, ImageMetadata* metadata, bool colour_suffices) {
     try {
-        check_exr_headers(path.string(), read_file_bytes(path));  // before the library allocates by them
-        Imf::InputFile exr(path.c_str());
+        const std::string bytes = checked_exr(path.string(), read_file_bytes(path));
+        ExrInput stream(path.string(), bytes);
+        Imf::InputFile exr(stream);
         const Imf::Header& header = exr.header();
         const Imath::Box2i data = header.dataWindow(), display = header.displayWindow();
         RenderImage image;
