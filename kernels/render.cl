@@ -6,12 +6,12 @@
 
 /// Adds what a work-item has gathered for one row of sums to what earlier launches left there, if any.
 static void sums_add(__global ulong* out, const ulong* sum, uint resume) {
+    ulong carry = 0;
     for (int i = 0; i < FILM_WORDS; ++i) {
+        const ulong old = resume ? out[i] : 0, value = old + sum[i] + carry;
         // 128-bit sums carry from their even to their odd word; the counters that follow stand alone.
-        const ulong old = resume ? out[i] : 0;
-        ulong carry = 0;
-        if (i < FILM_ALPHA && (i & 1)) carry = out[i - 1] < sum[i - 1] ? 1 : 0;
-        out[i] = old + sum[i] + carry;
+        carry = i < FILM_ALPHA && !(i & 1) && value < old ? 1 : 0;
+        out[i] = value;
     }
 }
 
@@ -27,17 +27,17 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     p.flags = 0;
     flight_clear(&p.flight);
     if (resume) {
-        const PathState s = states[item];
-        p.o = s.origin.xyz;
-        p.flight.t = s.origin.w;
-        p.d = s.direction.xyz;
-        p.phase_pdf = s.direction.w;
-        p.beta = to_spectrum(s.beta);
-        p.radiance = to_spectrum(s.radiance);
-        p.sample = s.sample;
-        p.depth = s.depth;
-        p.flight.draw = s.draw;
-        p.flags = s.flags;
+        __global const PathState* s = states + item;
+        p.o = s->origin.xyz;
+        p.flight.t = s->origin.w;
+        p.d = s->direction.xyz;
+        p.phase_pdf = s->direction.w;
+        p.beta = to_spectrum(s->beta);
+        p.radiance = to_spectrum(s->radiance);
+        p.sample = s->sample;
+        p.depth = s->depth;
+        p.flight.draw = s->draw;
+        p.flags = s->flags;
     }
     ulong sum[FILM_WORDS];
     for (int i = 0; i < FILM_WORDS; ++i) sum[i] = 0;
@@ -62,21 +62,20 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
 #endif
     const bool more = p.sample < sample_end;
     if (more) {
-        PathState s;
-        s.origin = (float4)(p.o, p.flight.t);
-        s.direction = (float4)(p.d, p.phase_pdf);
+        __global PathState* s = states + item;  // one by one: what pads them is nobody's
+        s->origin = (float4)(p.o, p.flight.t);
+        s->direction = (float4)(p.d, p.phase_pdf);
 #if CLUME_CHANNELS == 1
-        s.beta = (float4)(p.beta);
-        s.radiance = (float4)(p.radiance);
+        s->beta = (float4)(p.beta);
+        s->radiance = (float4)(p.radiance);
 #else
-        s.beta = (float4)(p.beta, 0.0f);
-        s.radiance = (float4)(p.radiance, 0.0f);
+        s->beta = (float4)(p.beta, 0.0f);
+        s->radiance = (float4)(p.radiance, 0.0f);
 #endif
-        s.sample = p.sample;
-        s.depth = p.depth;
-        s.draw = p.flight.draw;
-        s.flags = p.flags;
-        states[item] = s;
+        s->sample = p.sample;
+        s->depth = p.depth;
+        s->draw = p.flight.draw;
+        s->flags = p.flags;
         atomic_inc(unfinished);
     } else {
         // Others may go on in a launch to come: there this one must find itself done.
@@ -121,7 +120,7 @@ static vint lanes_assign(Lanes* l, Rows* rows, vint idle, uint splits, uint samp
     return begun;
 }
 
-static void lanes_resume(Lanes* l, uint i, const PathState* s) {
+static void lanes_resume(Lanes* l, uint i, __global const PathState* s) {
     ((float*)&l->flight.ox)[i] = s->origin.x;
     ((float*)&l->flight.oy)[i] = s->origin.y;
     ((float*)&l->flight.oz)[i] = s->origin.z;
@@ -142,7 +141,7 @@ static void lanes_resume(Lanes* l, uint i, const PathState* s) {
     ((int*)&l->alpha)[i] = (s->flags & PATH_ALPHA) ? -1 : 0;
 }
 
-static void lanes_save(const Lanes* l, uint i, uint next, PathState* s) {
+static void lanes_save(const Lanes* l, uint i, uint next, __global PathState* s) {
     const LaneFlights* f = &l->flight;
     s->origin = (float4)(lane_origin(f, i), LANE_OF(float, f->t, i));
     s->direction = (float4)(lane_direction(f, i), LANE_OF(float, l->phase_pdf, i));
@@ -188,9 +187,8 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     l.violations = 0;
     l.excess = 0;
     for (uint i = 0; resume && i < count; ++i) {
-        const PathState s = states[first_row + i];
-        lanes_resume(&l, i, &s);
-        ((uint*)&l.draws.pixel)[i] = LANE_OF(uint, rows.pixel, s.row);
+        lanes_resume(&l, i, states + first_row + i);
+        ((uint*)&l.draws.pixel)[i] = LANE_OF(uint, rows.pixel, LANE_OF(uint, l.row, i));
     }
     ulong sum[CLUME_WIDTH * FILM_WORDS];
     for (uint i = 0; i < CLUME_WIDTH * FILM_WORDS; ++i) sum[i] = 0;
@@ -242,9 +240,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     sum[FILM_EXCESS] = l.excess;
     if (vany(l.alive) || vany(rows.next < (vuint)sample_end)) atomic_inc(unfinished);
     for (uint i = 0; i < count; ++i) {
-        PathState s;
-        lanes_save(&l, i, LANE_OF(uint, rows.next, i), &s);
-        states[first_row + i] = s;
+        lanes_save(&l, i, LANE_OF(uint, rows.next, i), states + first_row + i);
         sums_add(sums + (size_t)(first_row + i) * FILM_WORDS, sum + i * FILM_WORDS, resume);
     }
 }

@@ -36,6 +36,9 @@ using Outputs = std::map<std::string, std::vector<std::uint32_t>>;
 
 /// The kernels that need no scene.
 Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t count);
+/// Those of stress.cl; and those of bench/, whose values are of no use.
+Outputs run_stress_kernels(const DeviceInfo& device, std::size_t count);
+Outputs run_bench_kernels(const DeviceInfo& device, int width);
 /// The kernels that do: probe_ray, probe_camera, probe_grid, and the image of `spp` samples per pixel. Only the image if `count` is 0.
 Outputs run_method(const DeviceInfo& device, int width, const Scene& scene, const Pair& pair, std::size_t count, std::uint32_t spp = 1);
 

@@ -166,12 +166,14 @@ TEST_CASE("EntryPoints.AreAllRun", "[.][entry]") {
     const DeviceInfo device = select_devices({}).front();
     Outputs all = run_building_blocks(device, 4, 8);
     all.merge(run_building_blocks(device, 16, 8));
+    all.merge(run_stress_kernels(device, 8));
+    for (const int width : {1, 4}) all.merge(run_bench_kernels(device, width));
     for (const MethodCase& c : method_cases()) all.merge(run_method(device, 4, scene_of(c), c.pair, 8));
     for (const int width : {1, 4}) all.merge(run_method(device, width, hardly_anything(), {"delta"}, 8));
     std::size_t kernels = 0;
     for (const EmbeddedFile& file : embedded_kernels()) {
         const std::string text(file.text);
-        const std::regex entry("__kernel void (\\w+)\\(");
+        const std::regex entry("\n__kernel void (\\w+)\\(");  // those made by macros are indented
         for (std::sregex_iterator it(text.begin(), text.end(), entry), end; it != end; ++it, ++kernels) {
             const std::string name = (*it)[1];
             INFO(name);
