@@ -156,6 +156,7 @@ __kernel void environment_lookups(SCENE_ARGS, __global const float4* directions,
     out[i] = sum;
 }
 
+#if !CLUME_LANES  // which add to sums in global memory
 /// Samples added to the sums of one pixel.
 __kernel void film_samples(__global const float4* colours, __global float* out, uint count, uint rounds) {
     const uint i = (uint)get_global_id(0);
@@ -167,6 +168,7 @@ __kernel void film_samples(__global const float4* colours, __global float* out, 
     for (int k = 0; k < FILM_WORDS; ++k) total ^= sums[k];
     out[i] = (float)total;
 }
+#endif
 
 /// Every ray against the boxes of `rounds` nodes of the bvh.
 __kernel void node_tests(SCENE_ARGS, __global const float4* rays, __global float* out, uint count, uint rounds, uint ray_count) {

@@ -15,8 +15,14 @@ typedef float3 spectrum;
 #define spectrum_sum(s) ((s).x + (s).y + (s).z)
 #endif
 
+#if CLUME_LANES
+#define FILM_SPACE __global  // a work-item adds to many pixels
+#else
+#define FILM_SPACE
+#endif
+
 /// (lo, hi) += x, for 0 <= x < 2^61.
-static void film_add(ulong* sum, float x) {
+static void film_add(FILM_SPACE ulong* sum, float x) {
     const uint bits = as_uint(x);
     const int exponent = (int)(bits >> 23);
     const ulong mantissa = (ulong)((bits & 0x7fffffu) | 0x800000u);
@@ -37,7 +43,7 @@ static void film_add(ulong* sum, float x) {
 }
 
 /// Adds one sample: per channel x and x². A sample that is not finite (or beyond 2^30) is counted and adds nothing.
-static void film_sample(ulong* sums, spectrum radiance, float scale) {
+static void film_sample(FILM_SPACE ulong* sums, spectrum radiance, float scale) {
     const float total = spectrum_sum(radiance) * scale;
     if (total == 0.0f) return;
     if (!(total > 0.0f && total < 0x1p30f)) {

@@ -22,7 +22,7 @@
 //   grid_cells CellEntry             per grid: its table of bricks (roots, then blocks of 8 children), its bounds' own table
 //   grid_values float[729]           per brick: 9 × 9 × 9 samples, x fastest
 //   pixels   uint                    film index (x + width * y) of each pixel that the batch renders
-//   states   PathState               per row of sums, kept between launches
+//   states   PathState               per row of sums, or per lane of a work-item; kept between launches
 //   sums     ulong[FILM_WORDS]       per row: a share of one pixel's samples, 128-bit fixed point (film.cl)
 #ifndef CLUME_LAYOUT_H
 #define CLUME_LAYOUT_H
@@ -216,7 +216,9 @@ typedef struct PathState {
     float4 beta;
     float4 radiance;
     uint sample, depth, draw, flags;  // sample: the next one if no path is alive
-    uint row, next, pad0, pad1;       // of lanes: which row the path counts for; the next sample of this one
+    // Of lanes: the row that the path counts for; the one of which the next path will be, and its next sample; the work-item's
+    // first row that is nobody's yet.
+    uint row, next_row, next, fresh;
 } PathState;
 
 #ifdef __cplusplus

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Entry point. A row of sums gathers a share of one pixel's samples; a work-item renders a row's, one after the other, or, with
-// CLUME_LANES, those of CLUME_WIDTH rows side by side: lanes take the next sample of any of them as they come free. After
-// CLUME_LAUNCH_EVENTS events (a lane) it saves its paths, counts itself in `unfinished`, and goes on in the next launch.
+// CLUME_LANES, those of `rows_each` rows, CLUME_WIDTH paths side by side: lanes take the next sample of any of them as they come
+// free. After CLUME_LAUNCH_EVENTS events a row it saves its paths, counts itself in `unfinished`, and goes on in the next launch.
 #include "lane_path.cl"
 
+#if !CLUME_LANES
 /// Adds what a work-item has gathered for one row of sums to what earlier launches left there, if any.
 static void sums_add(__global ulong* out, const ulong* sum, uint resume) {
     ulong carry = 0;
@@ -15,9 +16,8 @@ static void sums_add(__global ulong* out, const ulong* sum, uint resume) {
     }
 }
 
-#if !CLUME_LANES
-__kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState* states, __global ulong* sums,
-                     __global uint* unfinished, uint pixel_first, uint pixel_count, uint splits, uint sample_begin, uint sample_end, uint resume) {
+__kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState* states, __global ulong* sums, __global uint* unfinished, uint pixel_first,
+                     uint pixel_count, uint splits, uint sample_begin, uint sample_end, uint rows_each, uint resume) {
     const uint item = (uint)get_global_id(0);
     if (item >= pixel_count * splits) return;
     const uint pixel = pixels[pixel_first + item % pixel_count];
@@ -85,36 +85,63 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     sums_add(sums + (size_t)item * FILM_WORDS, sum, resume);
 }
 #else
-/// A work-item's rows of sums, lane i being row i (`own`): their pixels, and the next sample of each.
+/// The rows of sums that lanes take samples of, a row each: its index among the work-item's, its pixel, its next sample.
 typedef struct {
-    vuint own, next, pixel;
-    vfloat x, y;  // the pixel's lower corner on the film
+    vuint index, pixel, next;
+    vfloat x, y;        // the pixel's lower corner on the film
+    uint fresh, count;  // the first row that no lane has begun; all of them
 } Rows;
 
-/// Gives each idle lane the next sample of its own row, or, that row being done, of the one of which most is left; returns the
-/// lanes that got one.
-static vint lanes_assign(Lanes* l, Rows* rows, vint idle, uint splits, uint sample_end) {
-    vint begun = idle & (rows->next < (vuint)sample_end);
+/// What a work-item's rows have in common.
+typedef struct {
+    uint first_row, pixel_first, pixel_count, splits, sample_begin, sample_end;
+} Share;
+
+/// Lane i takes samples of a row from now on: those from `next` on.
+static void rows_enter(Rows* rows, uint i, uint index, uint next, const Share* share, __global const uint* pixels, __constant const RenderParams* params) {
+    const uint pixel = pixels[share->pixel_first + (share->first_row + index) % share->pixel_count], y = pixel / params->film_width;
+    ((uint*)&rows->index)[i] = index;
+    ((uint*)&rows->pixel)[i] = pixel;
+    ((uint*)&rows->next)[i] = next;
+    ((float*)&rows->x)[i] = (float)(pixel - y * params->film_width) - params->film_cx;
+    ((float*)&rows->y)[i] = (float)y - params->film_cy;
+}
+
+/// A row's first sample: every splits-th of the range from there is its own.
+static uint first_sample(uint index, const Share* share) { return share->sample_begin + (share->first_row + index) / share->pixel_count; }
+
+/// Whether samples are left that no lane has begun.
+static bool rows_left(const Rows* rows, const Share* share) { return rows->fresh < rows->count || vany(rows->next < (vuint)share->sample_end); }
+
+/// Gives each idle lane the next sample of its row; that row being done, of a row that is nobody's yet; none being left, of the
+/// row of which most is left. Returns the lanes that got one.
+static vint lanes_assign(Lanes* l, Rows* rows, vint idle, const Share* share, __global const uint* pixels, __constant const RenderParams* params) {
+    vint begun = idle & (rows->next < (vuint)share->sample_end);
     LANE_SET(l->draws.sample, rows->next, begun);
     LANE_SET(l->draws.pixel, rows->pixel, begun);
     LANE_SET(l->film_x, rows->x, begun);
     LANE_SET(l->film_y, rows->y, begun);
-    LANE_SET(l->row, rows->own, begun);
-    LANE_SET(rows->next, rows->next + splits, begun);
+    LANE_SET(l->row, rows->index, begun);
+    LANE_SET(rows->next, rows->next + share->splits, begun);
     const vint rest = idle & ~begun;
-    if (!vany(rest) || !vany(rows->next < (vuint)sample_end)) return begun;
-    for (int i = 0; i < CLUME_WIDTH; ++i) {
+    if (!vany(rest) || !rows_left(rows, share)) return begun;
+    for (uint i = 0; i < CLUME_WIDTH; ++i) {
         if (!LANE_OF(int, rest, i)) continue;
-        uint row = 0;
-        for (uint k = 1; k < CLUME_WIDTH; ++k)
-            if (LANE_OF(uint, rows->next, k) < LANE_OF(uint, rows->next, row)) row = k;
-        if (LANE_OF(uint, rows->next, row) >= sample_end) break;
-        ((uint*)&l->row)[i] = row;
-        ((uint*)&l->draws.sample)[i] = LANE_OF(uint, rows->next, row);
-        ((uint*)&l->draws.pixel)[i] = LANE_OF(uint, rows->pixel, row);
-        ((float*)&l->film_x)[i] = LANE_OF(float, rows->x, row);
-        ((float*)&l->film_y)[i] = LANE_OF(float, rows->y, row);
-        ((uint*)&rows->next)[row] += splits;
+        uint from = i;
+        if (rows->fresh < rows->count) {
+            rows_enter(rows, i, rows->fresh, first_sample(rows->fresh, share), share, pixels, params);
+            ++rows->fresh;
+        } else {
+            for (uint k = 0; k < CLUME_WIDTH; ++k)
+                if (LANE_OF(uint, rows->next, k) < LANE_OF(uint, rows->next, from)) from = k;
+        }
+        if (LANE_OF(uint, rows->next, from) >= share->sample_end) continue;
+        ((uint*)&l->row)[i] = LANE_OF(uint, rows->index, from);
+        ((uint*)&l->draws.sample)[i] = LANE_OF(uint, rows->next, from);
+        ((uint*)&l->draws.pixel)[i] = LANE_OF(uint, rows->pixel, from);
+        ((float*)&l->film_x)[i] = LANE_OF(float, rows->x, from);
+        ((float*)&l->film_y)[i] = LANE_OF(float, rows->y, from);
+        ((uint*)&rows->next)[from] += share->splits;
         ((int*)&begun)[i] = -1;
     }
     return begun;
@@ -141,7 +168,7 @@ static void lanes_resume(Lanes* l, uint i, __global const PathState* s) {
     ((int*)&l->alpha)[i] = (s->flags & PATH_ALPHA) ? -1 : 0;
 }
 
-static void lanes_save(const Lanes* l, uint i, uint next, __global PathState* s) {
+static void lanes_save(const Lanes* l, const Rows* rows, uint i, __global PathState* s) {
     const LaneFlights* f = &l->flight;
     s->origin = (float4)(lane_origin(f, i), LANE_OF(float, f->t, i));
     s->direction = (float4)(lane_direction(f, i), LANE_OF(float, l->phase_pdf, i));
@@ -152,54 +179,47 @@ static void lanes_save(const Lanes* l, uint i, uint next, __global PathState* s)
     s->draw = LANE_OF(uint, f->draw, i);
     s->flags = (LANE_OF(int, l->alive, i) ? PATH_ALIVE : 0u) | (LANE_OF(int, l->alpha, i) ? PATH_ALPHA : 0u);
     s->row = LANE_OF(uint, l->row, i);
-    s->next = next;
+    s->next_row = LANE_OF(uint, rows->index, i);
+    s->next = LANE_OF(uint, rows->next, i);
+    s->fresh = rows->fresh;
 }
 
-__kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState* states, __global ulong* sums,
-                     __global uint* unfinished, uint pixel_first, uint pixel_count, uint splits, uint sample_begin, uint sample_end, uint resume) {
-    const uint first_row = (uint)get_global_id(0) * CLUME_WIDTH;
-    if (first_row >= pixel_count * splits) return;
-    const uint count = min((uint)CLUME_WIDTH, pixel_count * splits - first_row);
-    Rows rows;
-    rows.next = (vuint)sample_end;
-    rows.own = rows.pixel = (vuint)0u;
-    rows.x = rows.y = (vfloat)0.0f;
-    vint usable = (vint)0;  // a lane without a row has nowhere to leave its path
-    for (uint i = 0; i < count; ++i) {
-        ((int*)&usable)[i] = -1;
-        ((uint*)&rows.own)[i] = i;
-        const uint pixel = pixels[pixel_first + (first_row + i) % pixel_count], y = pixel / params->film_width;
-        ((uint*)&rows.next)[i] = resume ? states[first_row + i].next : sample_begin + (first_row + i) / pixel_count;
-        ((uint*)&rows.pixel)[i] = pixel;
-        ((float*)&rows.x)[i] = (float)(pixel - y * params->film_width) - params->film_cx;
-        ((float*)&rows.y)[i] = (float)y - params->film_cy;
-    }
+__kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState* states, __global ulong* sums, __global uint* unfinished, uint pixel_first,
+                     uint pixel_count, uint splits, uint sample_begin, uint sample_end, uint rows_each, uint resume) {
+    const Share share = {(uint)get_global_id(0) * rows_each, pixel_first, pixel_count, splits, sample_begin, sample_end};
+    if (share.first_row >= pixel_count * splits) return;
+    states += (size_t)get_global_id(0) * CLUME_WIDTH;
+    sums += (size_t)share.first_row * FILM_WORDS;
     Lanes l;
     for (uint i = 0; i < sizeof(Lanes) / sizeof(uint); ++i) ((uint*)&l)[i] = 0;  // idle lanes are computed with, too
-    l.alive = l.alpha = l.under_way = (vint)0;
     l.result = (vint)FLIGHT_ESCAPED;
-    l.row = l.draws.sample = l.draws.pixel = l.draws.depth = (vuint)0u;
     l.draws.seed = (uint2)(params->seed_lo, params->seed_hi);
-#if LANE_SHADOWS
-    l.shadow = (vint)0;
-#endif
-    l.above = (vint)0;
-    l.violations = 0;
-    l.excess = 0;
-    for (uint i = 0; resume && i < count; ++i) {
-        lanes_resume(&l, i, states + first_row + i);
-        ((uint*)&l.draws.pixel)[i] = LANE_OF(uint, rows.pixel, LANE_OF(uint, l.row, i));
+    Rows rows;
+    rows.index = rows.pixel = (vuint)0u;
+    rows.next = (vuint)sample_end;
+    rows.x = rows.y = (vfloat)0.0f;
+    rows.count = min(rows_each, pixel_count * splits - share.first_row);
+    rows.fresh = resume ? states[0].fresh : min((uint)CLUME_WIDTH, rows.count);
+    for (uint i = 0; i < CLUME_WIDTH; ++i) {
+        if (resume) {
+            rows_enter(&rows, i, states[i].row, 0, &share, pixels, params);
+            ((uint*)&l.draws.pixel)[i] = LANE_OF(uint, rows.pixel, i);
+            rows_enter(&rows, i, states[i].next_row, states[i].next, &share, pixels, params);
+            lanes_resume(&l, i, states + i);
+        } else if (i < rows.count) {
+            rows_enter(&rows, i, i, first_sample(i, &share), &share, pixels, params);
+        }
     }
-    ulong sum[CLUME_WIDTH * FILM_WORDS];
-    for (uint i = 0; i < CLUME_WIDTH * FILM_WORDS; ++i) sum[i] = 0;
+    if (!resume)
+        for (uint i = 0; i < rows.count * FILM_WORDS; ++i) sums[i] = 0;
     int events = 0;
     vint waiting = l.alive, out = (vint)0;  // paths about to fly; paths flying, or at the end of a flight
     for (;;) {
-        const bool tired = events >= CLUME_LAUNCH_EVENTS * CLUME_WIDTH;
+        const bool tired = events >= CLUME_LAUNCH_EVENTS * (int)rows_each;
         if (!tired) {
-            const vint idle = usable & ~l.alive;
-            if (vany(rows.next < (vuint)sample_end) && vany(idle)) {
-                const vint begun = lanes_assign(&l, &rows, idle, splits, sample_end);
+            const vint idle = ~l.alive;
+            if (vany(idle) && rows_left(&rows, &share)) {
+                const vint begun = lanes_assign(&l, &rows, idle, &share, pixels, params);
                 lanes_start(&l, begun, params);
                 waiting |= begun;
             }
@@ -231,17 +251,14 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
         if (!vany(over)) continue;
         for (int i = 0; i < CLUME_WIDTH; ++i) {
             if (!LANE_OF(int, over, i)) continue;
-            ulong* s = sum + LANE_OF(uint, l.row, i) * FILM_WORDS;
+            __global ulong* s = sums + LANE_OF(uint, l.row, i) * FILM_WORDS;
             film_sample(s, LANE_SPECTRUM(l.radiance, i), params->film_scale);
             s[FILM_ALPHA] += LANE_OF(int, l.alpha, i) ? 1 : 0;
         }
     }
-    sum[FILM_VIOLATIONS] = l.violations + (uint)lanes_count(l.above);
-    sum[FILM_EXCESS] = l.excess;
-    if (vany(l.alive) || vany(rows.next < (vuint)sample_end)) atomic_inc(unfinished);
-    for (uint i = 0; i < count; ++i) {
-        lanes_save(&l, i, LANE_OF(uint, rows.next, i), states + first_row + i);
-        sums_add(sums + (size_t)(first_row + i) * FILM_WORDS, sum + i * FILM_WORDS, resume);
-    }
+    sums[FILM_VIOLATIONS] += l.violations + (uint)lanes_count(l.above);
+    sums[FILM_EXCESS] += l.excess;
+    if (vany(l.alive) || rows_left(&rows, &share)) atomic_inc(unfinished);
+    for (uint i = 0; i < CLUME_WIDTH; ++i) lanes_save(&l, &rows, i, states + i);
 }
 #endif

@@ -12,6 +12,8 @@ namespace clume {
 namespace {
 
 constexpr std::size_t kLocalSize = 8;  // rows of sums that a work-group fills, or as many as one work-item does
+constexpr std::size_t kSamplesPerLane = 64;  // that a work-item has at least, so that few of its lanes idle at its end
+constexpr std::size_t kItemsPerUnit = 16;    // at least, if there are rows enough: work-items differ in length
 constexpr std::size_t kFewestItems = 64;  // of a piece: a device without room for these is of no use
 constexpr unsigned kFirstBatchArg = SceneBuffers::kArgs + 1;  // after the scene and the pixels
 
@@ -35,7 +37,8 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
       unfinished_(queue_, 1),
       raised_(scene.learned.size(), 0.0f),
       lanes_(scene.lanes ? static_cast<std::size_t>(vector_width_of(info, vector_width)) : 1),
-      wanted_items_(items_wanted(info)) {
+      wanted_items_(items_wanted(info)),
+      units_(std::max(1u, info.compute_units)) {
     std::iota(order_.begin(), order_.end(), 0u);
     ProgramOptions options;
     options.optimised = optimised;
@@ -47,10 +50,10 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
     set_args(queue_, kernel_, SceneBuffers::kArgs, pixels_);
     // Code is generated at the first launch: pay for it here, on nothing.
     if (!tiles.empty()) {
-        states_ = Buffer<device::PathState>(queue_, kLocalSize);
-        sums_ = Buffer<std::uint64_t>(queue_, kLocalSize * FILM_WORDS);
-        set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(0), cl_uint(1), cl_uint(1), cl_uint(0), cl_uint(0), cl_uint(0));
-        launch(kLocalSize);
+        states_ = Buffer<device::PathState>(queue_, lanes_);
+        sums_ = Buffer<std::uint64_t>(queue_, FILM_WORDS);
+        set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(0), cl_uint(1), cl_uint(1), cl_uint(0), cl_uint(0), cl_uint(lanes_), cl_uint(0));
+        launch(1);
     }
 }
 
@@ -59,8 +62,12 @@ std::uint64_t DeviceRenderer::batch_bytes(const DeviceInfo& info, const std::vec
     return items * (sizeof(device::PathState) + 2 * FILM_WORDS * sizeof(std::uint64_t));
 }
 
-void DeviceRenderer::launch(std::size_t rows) {
-    queue_.launch(kernel_, (rows + lanes_ - 1) / lanes_, std::max<std::size_t>(1, kLocalSize / lanes_));
+void DeviceRenderer::launch(std::size_t items) { queue_.launch(kernel_, items, std::max<std::size_t>(1, kLocalSize / lanes_)); }
+
+std::size_t DeviceRenderer::rows_per_item(std::size_t rows, std::size_t samples) const {
+    if (lanes_ == 1) return 1;
+    const std::size_t enough = (kSamplesPerLane + samples - 1) / samples, balanced = rows / (lanes_ * kItemsPerUnit * units_);
+    return lanes_ * std::clamp<std::size_t>(enough, 1, std::max<std::size_t>(1, balanced));
 }
 
 void DeviceRenderer::aim(FilmSums& film, std::uint64_t seed) {
@@ -101,28 +108,28 @@ void DeviceRenderer::upload_changes() {
 DeviceRenderer::Piece DeviceRenderer::render(std::size_t first, std::size_t count, std::uint32_t begin, std::uint32_t end) {
     const std::size_t wanted = std::min(wanted_items_, most_items_);
     Piece piece{first, count, std::clamp<std::size_t>(wanted / count, 1, end - begin), {}};
-    const std::size_t items = count * piece.splits;
-    if (states_.size() < items || sums_.size() < items * FILM_WORDS) {
+    const std::size_t rows = count * piece.splits, rows_each = rows_per_item(rows, (end - begin) / piece.splits), items = (rows + rows_each - 1) / rows_each;
+    if (states_.size() < items * lanes_ || sums_.size() < rows * FILM_WORDS) {
         states_ = {};
         sums_ = {};
-        states_ = Buffer<device::PathState>(queue_, items);
-        sums_ = Buffer<std::uint64_t>(queue_, items * FILM_WORDS);
+        states_ = Buffer<device::PathState>(queue_, items * lanes_);
+        sums_ = Buffer<std::uint64_t>(queue_, rows * FILM_WORDS);
     }
     cl_uint resume = 0;
     for (;;) {
         const device::uint none = 0;
         unfinished_.upload(std::span(&none, 1));
         set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(first), cl_uint(count), cl_uint(piece.splits), cl_uint(begin),
-                 cl_uint(end), resume);
+                 cl_uint(end), cl_uint(rows_each), resume);
         launch(items);
         device::uint left = 0;
         unfinished_.download(std::span(&left, 1));
         alive();
         if (left == 0) break;
-        if (left > items) throw DeviceError(queue_.label() + " gives nonsense: " + std::to_string(left) + " of " + std::to_string(items) + " paths are unfinished");
+        if (left > items) throw DeviceError(queue_.label() + " gives nonsense: " + std::to_string(left) + " of " + std::to_string(items) + " work-items are unfinished");
         resume = 1;
     }
-    piece.sums.resize(items * FILM_WORDS);
+    piece.sums.resize(rows * FILM_WORDS);
     sums_.download(std::span(piece.sums));
     return piece;
 }

@@ -57,8 +57,9 @@ private:
     };
     /// Renders samples [begin, end) of the pixels.
     Piece render(std::size_t first, std::size_t count, std::uint32_t begin, std::uint32_t end);
-    /// One launch of the kernel for `rows` rows of sums.
-    void launch(std::size_t rows);
+    void launch(std::size_t items);
+    /// Rows of sums that a work-item fills, of so many with so many samples each.
+    std::size_t rows_per_item(std::size_t rows, std::size_t samples) const;
     /// Uploads what aim() and set_learned() have left to do: all calls that may fail or hang are made inside run().
     void upload_changes();
 
@@ -80,8 +81,9 @@ private:
     std::vector<float> raised_;
     bool aimed_ = false;                     ///< params_ are on the device
     bool chosen_ = true;                     ///< so are the pixels in their order
-    std::size_t lanes_;                      ///< rows of sums that a work-item fills
+    std::size_t lanes_;                      ///< paths that a work-item has side by side
     std::size_t wanted_items_;               ///< rows that keep the device busy
+    std::size_t units_;                      ///< compute units
     std::size_t most_items_ = SIZE_MAX;      ///< work-items that fit its memory, as far as known
     std::size_t short_of_memory_ = 0;
 };

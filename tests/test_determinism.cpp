@@ -137,6 +137,24 @@ TEST_CASE("Launches.PathsGoOnInTheNext") {
     }
 }
 
+TEST_CASE("Launches.WorkItemsTakeManyRows") {
+    // Few samples of many pixels: lanes go from row to row, in one launch or in many, and each path counts for its own.
+    Scene scene = grey_mixture();
+    scene.render.strategy = "delta";
+    scene.film = {64, 48};
+    DeviceScene device = make_device_scene(scene, {});
+    const DeviceImage alone = render_device(scene, device, 3, select_devices({}).front(), 1);
+    const auto check = [&](const char* events) {
+        set_define(device, "CLUME_LAUNCH_EVENTS", events);
+        for (const int width : {4, 16}) {
+            INFO(width << " paths side by side, " << events << " events a row in a launch");
+            CHECK(render_device(scene, device, 3, select_devices({}).front(), width).same_bits(alone));
+        }
+    };
+    check("4096");
+    check("2");
+}
+
 TEST_CASE("Launches.PausedFlightsKeepTheMean") {
     // A null-collision flight cut after every tentative collision, each launch after two events.
     Scene scene = grey_mixture();
