@@ -176,32 +176,37 @@ RootChoice choose_root_size(std::span<const Ellipsoid> ellipsoids, const BvhTree
 }  // namespace
 
 void measure_emptiness(std::span<std::uint32_t> roots, const glm::uvec3& counts) {
+    constexpr std::uint8_t most = CELL_EMPTY_MAX - 1;
+    // With a rim of cells that count as far away; rows follow each other in y, then in z.
     const glm::ivec3 n(counts);
-    const auto at = [&](int x, int y, int z) -> std::uint32_t& {
-        return roots[static_cast<std::size_t>(x) + static_cast<std::size_t>(n.x) * (static_cast<std::size_t>(y) + static_cast<std::size_t>(n.y) * static_cast<std::size_t>(z))];
+    const std::ptrdiff_t row = n.x + 2, plane = row * (n.y + 2);
+    std::vector<std::uint8_t> distances(static_cast<std::size_t>(plane * (n.z + 2)), most), near(static_cast<std::size_t>(row));
+    const auto row_at = [&](int y, int z) { return distances.data() + (z + 1) * plane + (y + 1) * row + 1; };
+    const auto each = [&](auto&& f) {
+        std::size_t i = 0;
+        for (int z = 0; z < n.z; ++z)
+            for (int y = 0; y < n.y; ++y)
+                for (int x = 0; x < n.x; ++x, ++i) f(roots[i], row_at(y, z)[x]);
     };
-    // Two sweeps of the 26-neighbour distance transform; beyond the grid counts as empty.
-    const auto sweep = [&](int direction) {
-        const auto order = [&](int count, int k) { return direction > 0 ? k : count - 1 - k; };
+    each([](std::uint32_t entry, std::uint8_t& distance) { distance = entry < CELL_EMPTY_MAX ? most : 0; });
+    // Two sweeps of the 26-neighbour distance transform: what lies behind in z and in y at once for a row, then what does in x.
+    for (const int ahead : {1, -1})
         for (int c = 0; c < n.z; ++c)
-            for (int b = 0; b < n.y; ++b)
+            for (int b = 0; b < n.y; ++b) {
+                std::uint8_t* here = row_at(ahead > 0 ? b : n.y - 1 - b, ahead > 0 ? c : n.z - 1 - c);
+                const std::uint8_t *behind = here - ahead * plane, *beside = here - ahead * row;
+                for (std::ptrdiff_t x = -1; x <= n.x; ++x)
+                    near[static_cast<std::size_t>(x + 1)] = std::min(std::min(behind[x - row], behind[x]), std::min(behind[x + row], beside[x]));
                 for (int a = 0; a < n.x; ++a) {
-                    const int x = order(n.x, a), y = order(n.y, b), z = order(n.z, c);
-                    std::uint32_t& entry = at(x, y, z);
-                    if (entry >= CELL_EMPTY_MAX) continue;
-                    std::uint32_t least = CELL_EMPTY_MAX - 2;
-                    for (int k = 0; k < 13; ++k) {
-                        const int dx = k % 3 - 1, dy = k / 3 % 3 - 1, dz = k / 9 - 1;
-                        const int i = x + direction * dx, j = y + direction * dy, l = z + direction * dz;
-                        if (i < 0 || j < 0 || l < 0 || i >= n.x || j >= n.y || l >= n.z) continue;
-                        const std::uint32_t other = at(i, j, l);
-                        least = std::min(least, other < CELL_EMPTY_MAX ? other : 0);
-                    }
-                    entry = std::min(direction > 0 ? CELL_EMPTY_MAX - 1 : entry, least + 1);
+                    const int x = ahead > 0 ? a : n.x - 1 - a;
+                    const std::uint8_t* by = near.data() + x;
+                    const int least = std::min({by[0], by[1], by[2], here[x - ahead]});
+                    here[x] = static_cast<std::uint8_t>(std::min<int>(here[x], least + 1));
                 }
-    };
-    sweep(1);
-    sweep(-1);
+            }
+    each([](std::uint32_t& entry, std::uint8_t distance) {
+        if (entry < CELL_EMPTY_MAX) entry = distance;
+    });
 }
 
 Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const CellOptions& options) {
