@@ -8,7 +8,7 @@
 
 #include "runtime/check.h"
 #include "runtime/hash.h"
-#include "runtime/program_cache.h"
+#include "runtime/disk_cache.h"
 
 namespace clume {
 
@@ -32,7 +32,7 @@ cl_int build(const cl::Program& program, const cl::Device& device, const std::st
 
 /// A driver may refuse a binary it once made; that's a miss.
 std::optional<cl::Program> build_from_cache(const Queue& queue, const std::string& key, const std::string& options) {
-    const std::optional<Binary> binary = load_binary(program_cache_folder(), key);
+    const std::optional<Binary> binary = load_binary(cache_folder(), key);
     if (!binary) return std::nullopt;
     try {
         const std::vector<cl::Device> devices{queue.info().device};
@@ -47,7 +47,7 @@ std::optional<cl::Program> build_from_cache(const Queue& queue, const std::strin
 void store_in_cache(const cl::Program& program, const std::string& key) {
     try {
         const auto binaries = program.getInfo<CL_PROGRAM_BINARIES>();
-        if (binaries.size() == 1) store_binary(program_cache_folder(), key, binaries[0]);
+        if (binaries.size() == 1) store_binary(cache_folder(), key, binaries[0]);
     } catch (const cl::Error&) {
         return;  // a platform that gives no binaries has no cache
     }

@@ -8,7 +8,7 @@
 
 #include "runtime/hash.h"
 #include "src/bvh.h"
-#include "src/cells.h"
+#include "src/cell_cache.h"
 #include "src/device_camera.h"
 #include "src/device_grids.h"
 #include "src/device_lamps.h"
@@ -166,7 +166,7 @@ std::string build_structures(const Structures& wanted, const BvhTree& tree, std:
             o.max_levels = 0;
             o.roots = majorant_grid;
         }
-        const Cells cells = build_cells(out.ellipsoids, tree, o);
+        const Cells cells = cached_cells(out.ellipsoids, tree, o, cells_folder());
         pack_cells(cells, wanted.cell_groups, wanted.references, out);
         text = fmt::format("{}x{}x{} cells, {} octree levels, {} leaves, {:.1f} references per primitive", cells.roots.x, cells.roots.y,
                            cells.roots.z, cells.levels, cells.leaves.size(), n ? static_cast<double>(cells.references) / static_cast<double>(n) : 0.0);

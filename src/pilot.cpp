@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "runtime/hash.h"
-#include "runtime/program_cache.h"
+#include "runtime/disk_cache.h"
 #include "src/device_lights.h"
 #include "src/device_scene.h"
 #include "src/error.h"
@@ -141,7 +141,7 @@ std::vector<std::pair<std::string, std::string>> Pilot::table() const {
 }
 
 std::filesystem::path pilot_folder() {
-    const std::filesystem::path cache = program_cache_folder();
+    const std::filesystem::path cache = cache_folder();
     return cache.empty() ? cache : cache / "pilots";
 }
 

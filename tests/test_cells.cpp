@@ -6,8 +6,10 @@
 #include <fmt/format.h>
 #include <sched.h>
 
+#include "src/cell_cache.h"
 #include "src/cells.h"
 #include "tests/flight_reference.h"
+#include "tests/temp_folder.h"
 
 namespace {
 
@@ -282,4 +284,40 @@ TEST_CASE("Cells.ThreadsChangeNothing", "[cells][quick]") {
         INFO(name);
         CHECK(same(many, single));
     }
+}
+
+TEST_CASE("Cells.AreKept", "[quick]") {
+    const DeviceScene scene = make_device_scene(huge_and_tiny(), {});
+    const BvhTree tree = build_bvh(scene.ellipsoids);
+    CellOptions options, finer;
+    options.max_references = finer.max_references = std::size_t{2} << 20;
+    options.control = true;
+    finer.roots = 20;
+    const Binary built = encode_cells(build_cells(scene.ellipsoids, tree, options)), other = encode_cells(build_cells(scene.ellipsoids, tree, finer));
+    REQUIRE(built != other);
+    CHECK(encode_cells(decode_cells(built)) == built);
+
+    const clume::test::TempFolder folder;
+    const auto ask = [&](const CellOptions& o, double long_enough_s = 0) { return encode_cells(cached_cells(scene.ellipsoids, tree, o, folder.path(), long_enough_s)); };
+    const auto files = [&] { return std::distance(std::filesystem::directory_iterator(folder.path()), std::filesystem::directory_iterator()); };
+    CHECK(ask(options, 1e9) == built);
+    CHECK(files() == 0);
+    CHECK(ask(options) == built);
+    REQUIRE(files() == 1);
+    // What lies there is what is given, if it can be.
+    const std::string key = std::filesystem::directory_iterator(folder.path())->path().stem().string();
+    REQUIRE(store_binary(folder.path(), key, other));
+    CHECK(ask(options) == other);
+    for (const std::size_t size : {std::size_t{1}, built.size() / 2, built.size() - 1}) {
+        REQUIRE(store_binary(folder.path(), key, std::span(built).first(size)));
+        CHECK(ask(options) == built);
+    }
+    CHECK(ask(finer) == other);
+    CHECK(files() == 2);
+    // A scene that differs in one bit is another.
+    std::vector<Ellipsoid> moved = scene.ellipsoids;
+    moved[3].center.x = std::nextafter(moved[3].center.x, 9.0);
+    (void)cached_cells(moved, tree, options, folder.path(), 0);
+    CHECK(files() == 3);
+    CHECK(encode_cells(cached_cells(scene.ellipsoids, tree, options, {}, 0)) == built);
 }

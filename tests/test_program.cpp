@@ -9,7 +9,7 @@
 #include "runtime/hash.h"
 #include "runtime/kernel.h"
 #include "runtime/program.h"
-#include "runtime/program_cache.h"
+#include "runtime/disk_cache.h"
 #include "runtime/queue.h"
 #include "runtime/source.h"
 #include "tests/runtime_harness.h"

@@ -224,8 +224,8 @@ TEST_CASE("HostTracer.absorbing_gaussian_closed_form", "[quick][reference]") {
     for (int y = 0; y < h; ++y)
         for (int x = 0; x < w; ++x) {
             double t = 0;  // over the pixel's area
-            for (int s = 0; s < 64; ++s)
-                t += absorbing_gaussian_transmittance(scene, x + (s % 8 + 0.5) / 8, y + (s / 8 + 0.5) / 8) / 64;
+            for (int row = 0; row < 8; ++row)
+                for (int column = 0; column < 8; ++column) t += absorbing_gaussian_transmittance(scene, x + (column + 0.5) / 8, y + (row + 0.5) / 8) / 64;
             const std::size_t i = static_cast<std::size_t>(y) * w + x;
             CHECK(std::abs(image.rgb[3 * i] - (1 - image.alpha[i])) < 1e-12);
             worst_depth = std::max(worst_depth, -std::log(t));

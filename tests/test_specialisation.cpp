@@ -190,8 +190,9 @@ TEST_CASE("ActivePixels.LeaveOutNoneThatSeesSomething", "[quick]") {
         std::size_t wrong = 0;
         for (std::size_t p = 0; p < active.size(); ++p) {
             bool something = false;
+            const std::size_t column = p % 40, row = p / 40;
             for (int k = 0; k < 8 && !something; ++k) {
-                const double x = static_cast<double>(p % 40) + u(engine), y = static_cast<double>(p / 40) + u(engine);
+                const double x = static_cast<double>(column) + u(engine), y = static_cast<double>(row) + u(engine);
                 const HostRay ray = camera.ray(x, y);
                 something = meets_medium(scene, ray) || std::isfinite(lights.nearest_surface(ray).t);
             }

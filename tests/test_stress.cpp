@@ -127,7 +127,7 @@ TEST_CASE("Stress.LightsTellWhatRoundingTheSceneDoes", "[kernels][quick]") {
 
 TEST_CASE("Stress.RowsTellWhatIsWrong", "[quick]") {
     const Limit limit{1e-6, LimitUnit::relative};
-    const auto row = [&](StressError e) { return stress_row("q", "f", "family", limit, {StressError{}, e}, {}); };
+    const auto row = [&](const StressError& e) { return stress_row("q", "f", "family", limit, {StressError{}, e}, {}); };
     StressError large, none;
     large.error = 2e-6;
     none.nonfinite = true;

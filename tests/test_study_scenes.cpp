@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <vector>
 
 #include "tests/reference/host_phase.h"
 #include "tests/reference/host_random.h"
@@ -67,8 +68,8 @@ TEST_CASE("StudyScenes.Anisotropy", "[quick]") {
     const Scene scene = bench::study_ball(spec);
     for (const std::size_t i : {0u, 1234u, 3999u}) {
         const glm::dmat3& a = scene.media[0].primitives[i].axes;
-        double length[] = {glm::length(a[0]), glm::length(a[1]), glm::length(a[2])};
-        std::sort(length, length + 3);
+        std::vector<double> length{glm::length(a[0]), glm::length(a[1]), glm::length(a[2])};
+        std::sort(length.begin(), length.end());
         CHECK(length[2] / length[0] == Approx(spec.anisotropy));
         CHECK(length[1] == Approx(spec.needles ? length[0] : length[2]));
         CHECK(std::cbrt(length[0] * length[1] * length[2]) * scene.media[0].extent == Approx(bench::support_radius(spec)));

@@ -12,6 +12,7 @@
 #include <boost/math/special_functions/erf.hpp>
 #include <boost/multiprecision/mpfr.hpp>
 #include <optional>
+#include <utility>
 
 namespace clume::reference::high {
 
@@ -118,7 +119,7 @@ public:
     /// `sigma`: peak extinction [1/length], density scale included; `extent` in scales.
     Chord(const glm::dvec3& origin, const glm::dvec3& direction, const glm::dvec3& mu, const Whitening& w, Real sigma,
           Real extent, KernelFamily family)
-        : sigma_(sigma), extent_(extent), family_(family) {
+        : sigma_(std::move(sigma)), extent_(std::move(extent)), family_(family) {
         a_ = w * Vector{Real(origin.x) - mu.x, Real(origin.y) - mu.y, Real(origin.z) - mu.z};
         b_ = w * Vector{direction.x, direction.y, direction.z};
         const Real w_squared = dot(b_, b_);

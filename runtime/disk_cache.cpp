@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The cache's file format and folder. Several processes may use one folder: files appear whole by rename.
-#include "runtime/program_cache.h"
+#include "runtime/disk_cache.h"
 
 #include <unistd.h>
 
@@ -8,7 +8,6 @@
 #include <atomic>
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
 #include <system_error>
 #include <utility>
 
@@ -23,6 +22,7 @@ namespace {
 constexpr std::string_view magic = "CLUMEPC1";
 constexpr std::size_t digest_size = 64, length_size = 16;
 constexpr std::size_t most_files = 256;
+constexpr std::uintmax_t most_bytes = std::uintmax_t{1} << 30;
 
 std::string fixed_hex(std::uint64_t value) {
     std::string text(length_size, '0');
@@ -39,20 +39,26 @@ fs::path file_of(const fs::path& folder, const std::string& key) {
 }
 
 void remove_oldest(const fs::path& folder) {
-    std::vector<std::pair<fs::file_time_type, fs::path>> files;
+    struct File {
+        fs::file_time_type time;
+        std::uintmax_t size;
+        fs::path path;
+    };
+    std::vector<File> files;
     std::error_code error;
     for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
         std::error_code gone;
-        if (it->path().extension() == ".clbin") files.emplace_back(it->last_write_time(gone), it->path());
+        if (it->path().extension() == ".clbin") files.push_back({it->last_write_time(gone), it->file_size(gone), it->path()});
     }
-    if (files.size() <= most_files) return;
-    std::sort(files.begin(), files.end());
-    for (std::size_t i = 0; i + most_files < files.size(); ++i) fs::remove(files[i].second, error);
+    std::sort(files.begin(), files.end(), [](const File& a, const File& b) { return a.time > b.time; });
+    std::uintmax_t bytes = 0;
+    for (std::size_t i = 0; i < files.size(); ++i)
+        if ((bytes += files[i].size) > most_bytes || i >= most_files) fs::remove(files[i].path, error);
 }
 
 }  // namespace
 
-fs::path program_cache_folder() {
+fs::path cache_folder() {
     if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache && *cache) return fs::path(cache) / "clume";
     if (const char* home = std::getenv("HOME"); home && *home) return fs::path(home) / ".cache" / "clume";
     return {};
@@ -82,7 +88,9 @@ std::optional<Binary> load_binary(const fs::path& folder, const std::string& key
     if (folder.empty()) return std::nullopt;
     std::ifstream file(file_of(folder, key), std::ios::binary);
     if (!file) return std::nullopt;
-    const std::string content{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    std::string content(fs::file_size(file_of(folder, key)), '\0');
+    file.read(content.data(), static_cast<std::streamsize>(content.size()));
+    content.resize(static_cast<std::size_t>(file.gcount()));
     return decode_cache_entry(key, content);
 } catch (const std::exception&) {
     return std::nullopt;

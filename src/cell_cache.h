@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// Cells kept on disk (runtime/disk_cache.h) where building them took long, so that a second render of a scene starts at once.
+#pragma once
+
+#include <filesystem>
+
+#include "runtime/disk_cache.h"
+#include "src/cells.h"
+
+namespace clume {
+
+/// build_cells(ellipsoids, tree, options), or what it gave when it was last asked the same. Kept are those that took that
+/// long, up to 256 MB. An empty folder keeps nothing.
+Cells cached_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const CellOptions& options, const std::filesystem::path& folder,
+                   double long_enough_s = 0.05);
+
+/// "cells" beside the programs; empty if there is no cache.
+std::filesystem::path cells_folder();
+
+Binary encode_cells(const Cells& cells);
+/// Throws SceneError if that is not what encode_cells made.
+Cells decode_cells(std::span<const unsigned char> bytes);
+
+}  // namespace clume
