@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Devices that share a render: paths per second of each alone and of all together, in turns. Halves of one CPU device; halves of
-// the CPU devices of two implementations; and every CPU device beside every GPU.
+// the CPU devices of two implementations; and every CPU device beside every GPU. Of two implementations each half is measured
+// alone on half of the cores: Intel's does not keep a sub-device's threads to its own while the others are free.
 #include <fmt/format.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "bench/sections.h"
 #include "runtime/device.h"
@@ -17,6 +21,8 @@
 
 namespace clume::bench {
 namespace {
+
+constexpr const char* kTwoImplementations = "two_implementations";
 
 struct Shared {
     std::string item;
@@ -33,11 +39,35 @@ std::vector<Shared> pairs_of(const DeviceInfo& own) {
     if (own.type == "cpu" && own.compute_units > 1) out.push_back({"cpu_split_2", split_cpu(own, 2)});
     for (std::size_t a = 0; a < cpus.size(); ++a)
         for (std::size_t b = a + 1; b < cpus.size(); ++b)
-            if (cpus[a].platform != cpus[b].platform) out.push_back({"two_implementations", {split_cpu(cpus[a], 2)[0], split_cpu(cpus[b], 2)[1]}});
+            if (cpus[a].platform != cpus[b].platform) out.push_back({kTwoImplementations, {split_cpu(cpus[a], 2)[0], split_cpu(cpus[b], 2)[1]}});
     for (const DeviceInfo& c : cpus)
         for (const DeviceInfo& g : gpus) out.push_back({"cpu_and_gpu", {c, g}});
     return out;
 }
+
+/// Keeps all threads that the process has now to the cores [first, first + count), until it is destroyed.
+class Confined {
+public:
+    Confined(unsigned first, unsigned count) {
+        sched_getaffinity(0, sizeof(before_), &before_);
+        cpu_set_t some;
+        CPU_ZERO(&some);
+        unsigned core = 0;
+        for (int c = 0; c < CPU_SETSIZE; ++c)
+            if (CPU_ISSET(c, &before_) && core++ >= first && core <= first + count) CPU_SET(c, &some);
+        if (CPU_COUNT(&some) == static_cast<int>(count)) set(some);
+    }
+    ~Confined() { set(before_); }
+    Confined(const Confined&) = delete;
+    Confined& operator=(const Confined&) = delete;
+
+private:
+    cpu_set_t before_;
+    static void set(const cpu_set_t& cores) {
+        for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task"))
+            sched_setaffinity(std::stoi(thread.path().filename().string()), sizeof(cores), &cores);
+    }
+};
 
 void measure(Session& session, const Shared& shared) {
     const Scene scene = reference::ball_scene();
@@ -60,16 +90,23 @@ void measure(Session& session, const Shared& shared) {
         const DispatchReport report = dispatch(workers, o);
         return static_cast<double>(pixels.size()) * samples / report.elapsed_s;
     };
+    // Of the device k alone, on its share of the cores.
+    const bool confine = shared.item == kTwoImplementations;
+    const auto speed_alone = [&](std::size_t k, std::uint32_t count) {
+        std::optional<Confined> confined;
+        if (confine) confined.emplace(k == 0 ? 0 : shared.devices[0].compute_units, shared.devices[k].compute_units);
+        return speed({all[k]}, count);
+    };
     // As many samples as make a turn long beside a batch.
     std::vector<std::uint32_t> samples;
-    for (const auto& w : all) samples.push_back(static_cast<std::uint32_t>(std::clamp((session.options().quick ? 0.2 : 2.0) * speed({w}, 2) / static_cast<double>(pixels.size()), 2.0, 4096.0)));
+    for (std::size_t k = 0; k < all.size(); ++k) samples.push_back(static_cast<std::uint32_t>(std::clamp((session.options().quick ? 0.2 : 2.0) * speed_alone(k, 2) / static_cast<double>(pixels.size()), 2.0, 4096.0)));
     std::vector<double> together, share;
     std::vector<std::vector<double>> alone(all.size());
     for (int round = -1; round < session.rounds(7); ++round) {
         double sum = 0;
         std::uint32_t whole = 0;
         for (std::size_t k = 0; k < all.size(); ++k) {
-            const double s = speed({all[k]}, samples[k]);
+            const double s = speed_alone(k, samples[k]);
             if (round >= 0) alone[k].push_back(s);
             sum += s;
             whole += samples[k];
