@@ -13,7 +13,7 @@ namespace clume {
 
 /// One device as found. `id` is "p0d1-slug-of-the-name": platform and device index in the loader's order, stable as long
 /// as the installed OpenCL implementations stay the same. Sub-devices add ".0", ".1", … ("p0d1.0-slug").
-struct DeviceInfo {
+struct DeviceInfo {  // NOLINT(bugprone-exception-escape): cl::Device says noexcept and may throw
     std::string id;
     std::string platform;
     std::string name;

@@ -28,7 +28,7 @@ std::string error_of(const std::filesystem::path& path) {
     try {
         read_environment(path);
     } catch (const SceneError& error) {
-        const std::string message = error.what();
+        std::string message = error.what();
         CHECK(message.find('\n') == std::string::npos);
         CHECK(message.find(path.string()) == 0);
         return message;

@@ -146,7 +146,8 @@ TEST_CASE("GridImages.ConstantBoxIsBeerLambert") {
                 double sum = 0;
                 constexpr int n = 24;
                 for (int k = 0; k < n * n; ++k) {
-                    const double px = x + (k % n + 0.5) / n, py = y + (k / n + 0.5) / n, step = 3.0 / 24;
+                    const int column = k % n, row = k / n;
+                    const double px = x + (column + 0.5) / n, py = y + (row + 0.5) / n, step = 3.0 / 24;
                     const glm::dvec3 o = scene.camera.origin + r * ((px - 12) * step) + u * ((10 - py) * step);
                     const glm::dvec3 a = (-half - o) / f, b = (half - o) / f, lo = glm::min(a, b), hi = glm::max(a, b);
                     sum += std::exp(-1.5 * std::max(0.0, std::min({hi.x, hi.y, hi.z}) - std::max({lo.x, lo.y, lo.z})));

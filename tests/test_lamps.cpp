@@ -12,7 +12,6 @@
 using namespace clume;
 using namespace clume::reference;
 using namespace clume::test;
-using std::numbers::pi;
 
 namespace {
 
