@@ -11,11 +11,21 @@
 typedef int ProcessorWords __attribute__((__vector_size__(64)));
 #endif
 
+// Elements of two vectors by their places, those of q counted on from those of p. Compilers know what to make of the built-in
+// one; shuffle2 is a function to some, and vectors put together element by element are taken apart by all.
+#ifdef __has_builtin
+#if __has_builtin(__builtin_shufflevector)
+#define LANES_PICK(p, q, ...) __builtin_shufflevector(p, q, __VA_ARGS__)
+#endif
+#endif
+#ifndef LANES_PICK
+#define LANES_PICK(p, q, ...) shuffle2(p, q, (vuint)(__VA_ARGS__))
+#endif
+
 /// The four words of record `index` of each lane, a word a vector.
 static void lanes_load(__global const uint4* records, vuint index, vuint* a, vuint* b, vuint* c, vuint* d) {
 #if CLUME_WIDTH == 16 && defined(__AVX512F__)
-    // The compiler turns what follows the #else into three times the instructions that it needs: where it says that it compiles for
-    // a processor with gathers of 16 words, it is told to use them.
+    // Where the compiler says that it compiles for a processor with gathers of 16 words, they are a little ahead of transposing.
     const ProcessorWords word = __builtin_astype(4u * index, ProcessorWords);
     const char* base = (const char*)(size_t)records;
     *a = __builtin_astype(__builtin_ia32_gathersiv16si(word, base, word, (ushort)0xffffu, 4), uint16);
@@ -30,17 +40,17 @@ static void lanes_load(__global const uint4* records, vuint index, vuint* a, vui
     const uint16 r1 = (uint16)(records[i[1]], records[i[5]], records[i[9]], records[i[13]]);
     const uint16 r2 = (uint16)(records[i[2]], records[i[6]], records[i[10]], records[i[14]]);
     const uint16 r3 = (uint16)(records[i[3]], records[i[7]], records[i[11]], records[i[15]]);
-#define LANES_LOW(p, q) (uint16)(p.s0, q.s0, p.s1, q.s1, p.s4, q.s4, p.s5, q.s5, p.s8, q.s8, p.s9, q.s9, p.sc, q.sc, p.sd, q.sd)
-#define LANES_HIGH(p, q) (uint16)(p.s2, q.s2, p.s3, q.s3, p.s6, q.s6, p.s7, q.s7, p.sa, q.sa, p.sb, q.sb, p.se, q.se, p.sf, q.sf)
+#define LANES_LOW(p, q) LANES_PICK(p, q, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29)
+#define LANES_HIGH(p, q) LANES_PICK(p, q, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31)
 #elif CLUME_WIDTH == 8
     const uint8 r0 = (uint8)(records[i[0]], records[i[4]]), r1 = (uint8)(records[i[1]], records[i[5]]);
     const uint8 r2 = (uint8)(records[i[2]], records[i[6]]), r3 = (uint8)(records[i[3]], records[i[7]]);
-#define LANES_LOW(p, q) (uint8)(p.s0, q.s0, p.s1, q.s1, p.s4, q.s4, p.s5, q.s5)
-#define LANES_HIGH(p, q) (uint8)(p.s2, q.s2, p.s3, q.s3, p.s6, q.s6, p.s7, q.s7)
+#define LANES_LOW(p, q) LANES_PICK(p, q, 0, 8, 1, 9, 4, 12, 5, 13)
+#define LANES_HIGH(p, q) LANES_PICK(p, q, 2, 10, 3, 11, 6, 14, 7, 15)
 #else
     const uint4 r0 = records[i[0]], r1 = records[i[1]], r2 = records[i[2]], r3 = records[i[3]];
-#define LANES_LOW(p, q) (uint4)(p.s0, q.s0, p.s1, q.s1)
-#define LANES_HIGH(p, q) (uint4)(p.s2, q.s2, p.s3, q.s3)
+#define LANES_LOW(p, q) LANES_PICK(p, q, 0, 4, 1, 5)
+#define LANES_HIGH(p, q) LANES_PICK(p, q, 2, 6, 3, 7)
 #endif
     const vuint lo02 = LANES_LOW(r0, r2), lo13 = LANES_LOW(r1, r3), hi02 = LANES_HIGH(r0, r2), hi13 = LANES_HIGH(r1, r3);
     *a = LANES_LOW(lo02, lo13);
