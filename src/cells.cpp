@@ -2,6 +2,7 @@
 #include "src/cells.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -70,6 +71,12 @@ struct Subtree {
     std::vector<Cells::Leaf> leaves;
     std::uint32_t root = 1;             ///< entry
     std::uint32_t depth = 0;
+
+    std::size_t byte_size() const {
+        std::size_t bytes = 4 * blocks.size();
+        for (const Cells::Leaf& leaf : leaves) bytes += sizeof(leaf) + 32 + 8 * leaf.primitives.size();  // and what the heap adds to two arrays
+        return bytes;
+    }
 };
 
 struct Refiner {
@@ -84,6 +91,8 @@ struct Refiner {
         if (list.primitives.empty()) return 1;
         if (control)
             for (const std::uint32_t i : list.primitives) list.control += box_extinction_least(ellipsoids[i], box);
+        list.primitives.shrink_to_fit();  // room was for all of the parent's
+        list.bounds.shrink_to_fit();
         out.leaves.push_back(std::move(list));
         return CELL_EMPTY_MAX + static_cast<std::uint32_t>(out.leaves.size() - 1);
     }
@@ -264,14 +273,23 @@ Cells build_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, co
     const double spare = static_cast<double>(max_references) / std::max(1.0, 0.6 * static_cast<double>(candidates.size()));
     const Refiner refiner{ellipsoids, cost, std::clamp(2.0 * spare, 1.5, 8.0), max_levels, 2.5 * choice.typical_cost, options.control};
     std::vector<Subtree> subtrees(roots);
+    // How much they take shows only on the way: the rest is expected to take as much per candidate as those so far.
+    std::atomic<std::size_t> candidates_done{0}, bytes_done{0};
     parallel_chunks(roots, 64, [&](std::size_t begin, std::size_t end) {
-        if (begin % 1024 == 0) require_memory("cells", {{"to split them further", (end - begin) * 4096}});  // how far shows only on the way
+        if (candidates_done > 0) {
+            const double left = static_cast<double>(candidates.size() - candidates_done), each = static_cast<double>(bytes_done) / static_cast<double>(candidates_done);
+            require_memory("cells", {{"to split them further", static_cast<std::uint64_t>(0.9 * left * each)}});
+        }
+        std::size_t bytes = 0;
         for (std::size_t r = begin; r < end; ++r) {
             const glm::dvec3 at(r % cells.roots.x, r / cells.roots.x % cells.roots.y, r / cells.roots.x / cells.roots.y);
             const Box box{cells.origin + at * cells.root_size, cells.origin + (at + 1.0) * cells.root_size};
             List list = list_of(ellipsoids, std::span(candidates).subspan(offset[r], offset[r + 1] - offset[r]), box);
             if (!list.primitives.empty()) subtrees[r].root = refiner.refine(subtrees[r], box, std::move(list), 0);
+            bytes += subtrees[r].byte_size();
         }
+        bytes_done += bytes;
+        candidates_done += offset[end] - offset[begin];
     });
 
     // One table: roots, then all blocks; leaves in the order of their roots.

@@ -46,9 +46,9 @@ under_tsan() {
     TSAN_OPTIONS=halt_on_error=0 "$(find "$build/tsan" -name clume_dispatcher_tests -type f -print -quit)"
 }
 
-# clang's warnings are reported by its tidy, too: the flags of GCC's build, but what only GCC knows.
+# clang's warnings are reported by its tidy, too: the flags of GCC's build, but what only GCC knows. libFuzzer's main is not in that build.
 tidy() {
-    (cd -- "$root" && git ls-files 'src/*.cpp' 'runtime/*.cpp' 'bench/*.cpp' 'tests/*.cpp' 'scenes/*.cpp') |
+    (cd -- "$root" && git ls-files 'src/*.cpp' 'runtime/*.cpp' 'bench/*.cpp' 'tests/*.cpp' 'scenes/*.cpp' ':!tests/fuzz/libfuzzer_main.cpp') |
         (cd -- "$root" && xargs -P "$jobs" -n 1 clang-tidy -p "$build/release" --quiet --extra-arg=-Wno-unknown-warning-option 2>/dev/null)
 }
 

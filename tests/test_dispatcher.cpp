@@ -23,7 +23,7 @@ namespace {
 
 /// BatchPlan on a made-up clock: item costs spread 100-fold, workers of the given speeds. Returns the time all is done
 /// over the time a perfect sharing would take.
-double simulated_makespan(const std::vector<double>& speeds, DispatchOptions options, Ledger& ledger, double& longest_s) {
+double simulated_makespan(const std::vector<double>& speeds, const DispatchOptions& options, Ledger& ledger, double& longest_s) {
     BatchPlan plan(options, speeds.size());
     std::vector<double> free_at(speeds.size(), 0);
     std::vector<std::optional<Batch>> held(speeds.size());
