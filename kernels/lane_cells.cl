@@ -7,10 +7,6 @@
 
 #define LANE_SET(to, value, mask) to = vselect(to, value, mask)
 
-#if defined(__AVX512F__)
-typedef int ProcessorWords __attribute__((__vector_size__(64)));
-#endif
-
 // Elements of two vectors by their places, those of q counted on from those of p. Compilers know what to make of the built-in
 // one; shuffle2 is a function to some, and vectors put together element by element are taken apart by all.
 #ifdef __has_builtin
@@ -24,15 +20,6 @@ typedef int ProcessorWords __attribute__((__vector_size__(64)));
 
 /// The four words of record `index` of each lane, a word a vector.
 static void lanes_load(__global const uint4* records, vuint index, vuint* a, vuint* b, vuint* c, vuint* d) {
-#if CLUME_WIDTH == 16 && defined(__AVX512F__)
-    // Where the compiler says that it compiles for a processor with gathers of 16 words, they are a little ahead of transposing.
-    const ProcessorWords word = __builtin_astype(4u * index, ProcessorWords);
-    const char* base = (const char*)(size_t)records;
-    *a = __builtin_astype(__builtin_ia32_gathersiv16si(word, base, word, (ushort)0xffffu, 4), uint16);
-    *b = __builtin_astype(__builtin_ia32_gathersiv16si(word, base + 4, word, (ushort)0xffffu, 4), uint16);
-    *c = __builtin_astype(__builtin_ia32_gathersiv16si(word, base + 8, word, (ushort)0xffffu, 4), uint16);
-    *d = __builtin_astype(__builtin_ia32_gathersiv16si(word, base + 12, word, (ushort)0xffffu, 4), uint16);
-#else
     const uint* i = (const uint*)&index;
     // Rows of four lanes' records beside each other, then 4 × 4 transposes in place: two rounds of interleaving.
 #if CLUME_WIDTH == 16
@@ -59,7 +46,6 @@ static void lanes_load(__global const uint4* records, vuint index, vuint* a, vui
     *d = LANES_HIGH(hi02, hi13);
 #undef LANES_LOW
 #undef LANES_HIGH
-#endif
 }
 
 /// Where CLUME_WIDTH flights are: CellWalk, a vector a member, and the tentative collision that each waits for.
