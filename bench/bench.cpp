@@ -22,7 +22,7 @@ namespace clume {
 namespace {
 
 constexpr const char* overview =
-    "Measures speed on one device. Sections: scenes (the renderer beside a plain host tracer), peaks (of the device), kernels (and the share\nof the peaks that they reach), specialisation, lamps, scaling,\nadaptive (what a noise threshold saves), devices (that share a render), work (what an operation costs); with --study the study of strategies instead.\n"
+    "Measures speed on one device. Sections: scenes (the renderer beside a plain host tracer), peaks (of the device), kernels (and the share\nof the peaks that they reach), specialisation, lamps, samplers, scaling,\nadaptive (what a noise threshold saves), devices (that share a render), work (what an operation costs); with --study the study of strategies instead.\n"
     "An item is called section/name: --list prints them, --filter chooses. Everything takes about ten minutes on two cores,\nthe study 15 to 30.\n";
 constexpr const char* examples =
     "Examples: clume bench --filter ^scenes/          clume bench --filter 'flight/ball.*w16'\n"
@@ -109,6 +109,7 @@ int run_bench(int argc, char** argv) {
         bench_kernels_section(session);
         bench_specialisation_section(session);
         bench_lamps_section(session);
+        bench_samplers_section(session);
         bench_scaling_section(session);
         bench_adaptive_section(session);
         bench_devices_section(session);

@@ -15,6 +15,7 @@ void bench_kernels_section(Session& session);  ///< kernels.cpp
 void write_roofline(Session& session, const std::filesystem::path& docs);
 void bench_specialisation_section(Session& session);
 void bench_lamps_section(Session& session);
+void bench_samplers_section(Session& session);
 void bench_scaling_section(Session& session);
 void bench_adaptive_section(Session& session);
 void bench_devices_section(Session& session);

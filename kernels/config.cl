@@ -62,6 +62,9 @@
 #ifndef CLUME_BISECTION  // 1: root finding of regular tracking by bisection; 0: safeguarded Newton
 #define CLUME_BISECTION 0
 #endif
+#ifndef CLUME_SOBOL  // 1: random numbers are spread evenly over a pixel's samples; 0: they are independent
+#define CLUME_SOBOL 0
+#endif
 #ifndef CLUME_COUNT  // 1: operations are counted (WORK_*)
 #define CLUME_COUNT 0
 #endif

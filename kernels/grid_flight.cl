@@ -94,7 +94,7 @@ static float grid_flight_delta(uint g, float3 o, float3 d, float t_end, uint ran
         const uint index = bounds_learned(&w, grid);
         const float majorant = learned[index];
         if (params->explore) {
-            const float place = progressive_place(bits.w, w.entry.link, t, min_s(w.t_exit, w.t_end));
+            const float place = progressive_place(bits.y, w.entry.link, t, min_s(w.t_exit, w.t_end));
             const float sigma = bounds_value(&w, grid, place, grid_cells, grid_values);
             if (sigma > majorant) atomic_max(raised + index, as_uint(sigma));
         }
@@ -118,7 +118,7 @@ static float grid_flight_delta(uint g, float3 o, float3 d, float t_end, uint ran
             COUNT(&f->work, WORK_VOXELS, 1);
             COUNT(&f->work, WORK_DENSITIES, 1);
             // Two tentative collisions a block of random numbers.
-            const uint accept = draw & 1u ? bits.w : bits.y;
+            const uint accept = draw & 1u ? bits.y : bits.w;
             if (uniform_s(accept) * majorant < sigma) return t;
             draw += 1;
             if (draw & 1u) {

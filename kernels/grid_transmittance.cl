@@ -97,7 +97,7 @@ static float grid_ratio(const bool residual, uint g, float3 o, float3 d, float t
             COUNT(&f->work, WORK_DENSITIES, 1);
             // Rounding must not take a value below the brick's least one, nor the share above 1.
             weight *= max_s(fma(-max_s(sigma - control, 0.0f), inverse, 1.0f), 0.0f);
-            if (!weight_roulette(&weight, draw & 1u ? bits.w : bits.y)) return 0.0f;
+            if (!weight_roulette(&weight, draw & 1u ? bits.y : bits.w)) return 0.0f;
             draw += 1;
             if (draw & 1u) {
                 tau = exponential_s(bits.z);

@@ -13,11 +13,7 @@ typedef struct {
 } LaneDraws;
 
 static void lanes_bits(const LaneDraws* r, vuint draw, vuint* a, vuint* b, vuint* c, vuint* d) {
-    *a = r->sample;
-    *b = r->pixel;
-    *c = r->depth;
-    *d = draw;
-    philox_v(a, b, c, d, r->seed);
+    draw_v(r->sample, r->pixel, r->depth, draw, r->seed, a, b, c, d);
 }
 
 static int lanes_count(vint mask) {

@@ -53,7 +53,7 @@ static void lanes_start(Lanes* l, vint mask, __constant const RenderParams* para
     vuint a, b, c, d;
     LANE_SET(l->draws.depth, (vuint)0u, mask);
     lanes_bits(&l->draws, (vuint)DRAW_CAMERA, &a, &b, &c, &d);
-    const vfloat fx = l->film_x + uniform_v(a), fy = l->film_y + uniform_v(b);
+    const vfloat fx = l->film_x + uniform_v(a), fy = l->film_y + uniform_v(d);
     LaneFlights* f = &l->flight;
     LANE_SET(f->ox, fma(fx, (vfloat)params->plane_x.x, fma(fy, (vfloat)params->plane_y.x, (vfloat)params->plane_c.x)), mask);
     LANE_SET(f->oy, fma(fx, (vfloat)params->plane_x.y, fma(fy, (vfloat)params->plane_y.y, (vfloat)params->plane_c.y)), mask);
@@ -209,7 +209,7 @@ static void lanes_collide(Lanes* l, vint mask, SCENE_ARGS) {
     LANE_SET(f->oz, fma(f->t, f->dz, f->oz), lives);
     lanes_bits(&l->draws, (vuint)DRAW_PHASE, &a, &b, &c, &d);
     vfloat x = f->dx, y = f->dy, z = f->dz;
-    LANE_SET(l->phase_pdf, phase_sample_v(phase, g, a, b, c, d, &x, &y, &z), lives);
+    LANE_SET(l->phase_pdf, phase_sample_v(phase, g, a, d, b, c, &x, &y, &z), lives);
     vint onward = lives;
 #if CLUME_NEE
     for (int i = 0; i < CLUME_WIDTH; ++i) {

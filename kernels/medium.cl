@@ -30,7 +30,10 @@ typedef struct {
     uint2 seed;
 } Draws;
 
-static uint4 draw_bits(const Draws* r, uint draw) { return philox((uint4)(r->sample, r->pixel, r->depth, draw), r->seed); }
+static uint4 draw_bits(const Draws* r, uint draw) { return draw_words(r->sample, r->pixel, r->depth, draw, r->seed); }
+
+/// A key for `primitive_bits`: independent words, whatever CLUME_SOBOL is.
+static uint2 draw_key(const Draws* r, uint draw) { return philox((uint4)(r->sample, r->pixel, r->depth, draw), r->seed).xy; }
 
 #define FLIGHT_ESCAPED 0
 #define FLIGHT_COLLIDED 1

@@ -24,7 +24,7 @@ typedef struct {
 static void path_begin(Path* p, uint pixel, uint sample, __constant const RenderParams* params) {
     const Draws r = {sample, pixel, 0, (uint2)(params->seed_lo, params->seed_hi)};
     const uint4 bits = draw_bits(&r, DRAW_CAMERA);
-    camera_ray(params, pixel % params->film_width, pixel / params->film_width, uniform_s(bits.x), uniform_s(bits.y), &p->o, &p->d);
+    camera_ray(params, pixel % params->film_width, pixel / params->film_width, uniform_s(bits.x), uniform_s(bits.w), &p->o, &p->d);
     p->phase_pdf = 0.0f;
     p->beta = (spectrum)1.0f;
     p->radiance = (spectrum)0.0f;
@@ -156,7 +156,7 @@ static void path_event(Path* p, uint pixel, SCENE_ARGS) {
     if (LAMP_DEPTH(p->depth + 1))
         p->radiance += p->beta * lamp_light(false, x, p->d, phase, g, spectrum_max(p->beta), &r, &p->flight, SCENE);
 #endif
-    p->d = phase_sample(phase, g, p->d, draw_bits(&r, DRAW_PHASE), &p->phase_pdf);
+    p->d = phase_sample(phase, g, p->d, draw_bits(&r, DRAW_PHASE).xwyz, &p->phase_pdf);
     p->o = x;
     p->depth += 1;
     p->flight.t = 0.0f;

@@ -4,6 +4,23 @@
 #include "lane_path.cl"
 #include "self_test.cl"
 
+/// out[i]: the words of draw counter[i] = (sample, pixel, depth, draw) under one seed, CLUME_WIDTH of them at once.
+__kernel void probe_draw(__global const uint4* counter, uint2 seed, __global uint4* out, uint count) {
+    const uint first = (uint)get_global_id(0) * CLUME_WIDTH;
+    if (first >= count) return;
+    vuint c[4], w[4];
+    for (uint i = 0; i < CLUME_WIDTH; ++i) {
+        const uint4 mine = counter[min(first + i, count - 1u)];
+        ((uint*)&c[0])[i] = mine.x;
+        ((uint*)&c[1])[i] = mine.y;
+        ((uint*)&c[2])[i] = mine.z;
+        ((uint*)&c[3])[i] = mine.w;
+    }
+    draw_v(c[0], c[1], c[2], c[3], seed, w, w + 1, w + 2, w + 3);
+    for (uint i = 0; i < CLUME_WIDTH && first + i < count; ++i)
+        out[first + i] = (uint4)(((const uint*)&w[0])[i], ((const uint*)&w[1])[i], ((const uint*)&w[2])[i], ((const uint*)&w[3])[i]);
+}
+
 /// out[i] = philox(counter[i], key[i].xy).
 __kernel void probe_philox(__global const uint4* counter, __global const uint4* key, __global uint4* out, uint count) {
     const uint i = (uint)get_global_id(0);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Random numbers as a pure function of (seed, pixel, sample, depth, draw[, primitive]): no state, so that the image does not
 // depend on devices, batches or traversal order. Philox4x32 with 7 rounds [Salmon11, doi 10.1145/2063384.2063405]; the tests
-// compare it with Random123's. Per-primitive bits come from a keyed 32-bit mixer, one multiply-xorshift chain per vector.
+// compare it with Random123's. With CLUME_SOBOL the same words are spread evenly over the samples of a pixel: padded pairs of a
+// scrambled Sobol' sequence [Burley20, JCGT 9(4); Laine11, doi 10.1111/j.1467-8659.2011.02010.x]. Per-primitive bits come from a keyed 32-bit mixer, one multiply-xorshift chain per vector.
 #include "math.cl"
 
 // Draw numbers: flights count up from 0; the others have their own block each. A grid's flight and its part in a shadow ray
@@ -53,6 +54,12 @@ static void product_v(vuint x, uint factor, vuint* high, vuint* low) {
 #include "vector.inc.cl"
 #include "rng_body.inc.cl"
 #include "body_end.inc.cl"
+
+static uint4 draw_words(uint sample, uint pixel, uint depth, uint draw, uint2 seed) {
+    uint x, y, z, w;
+    draw_s(sample, pixel, depth, draw, seed, &x, &y, &z, &w);
+    return (uint4)(x, y, z, w);
+}
 
 static uint4 philox(uint4 counter, uint2 key) {
     uint x = counter.x, y = counter.y, z = counter.z, w = counter.w;

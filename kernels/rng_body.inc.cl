@@ -22,6 +22,63 @@ static void FN(philox)(VU* c0, VU* c1, VU* c2, VU* c3, uint2 key) {
     *c3 = w;
 }
 
+#if CLUME_SOBOL
+/// The bits of x in reverse order.
+static VU FN(reverse)(VU x) {
+    x = (x >> (VU)16) | (x << (VU)16);
+    x = ((x >> (VU)8) & (VU)0x00ff00ffu) | ((x & (VU)0x00ff00ffu) << (VU)8);
+    x = ((x >> (VU)4) & (VU)0x0f0f0f0fu) | ((x & (VU)0x0f0f0f0fu) << (VU)4);
+    x = ((x >> (VU)2) & (VU)0x33333333u) | ((x & (VU)0x33333333u) << (VU)2);
+    return ((x >> (VU)1) & (VU)0x55555555u) | ((x & (VU)0x55555555u) << (VU)1);
+}
+
+/// Nested permutation [Owen95]: every bit is flipped by a hash of the seed and of the bits below it [Laine11], Vegdahl's constants.
+static VU FN(nested)(VU x, VU seed) {
+    x ^= x * (VU)0x3d20adeau;
+    x += seed;
+    x *= (seed >> (VU)16) | (VU)1u;
+    x ^= x * (VU)0x05526c56u;
+    return x ^ (x * (VU)0x53a22864u);
+}
+
+/// Second coordinate of the Sobol' sequence from the first, that is, from the point's number with its bits reversed: bit 31 − j is
+/// the sum modulo 2 of (k over j) times bit 31 − k, over k >= j.
+static VU FN(sobol_second)(VU x) {
+    x ^= x << (VU)16;
+    x ^= (x & (VU)0x00ff00ffu) << (VU)8;
+    x ^= (x & (VU)0x0f0f0f0fu) << (VU)4;
+    x ^= (x & (VU)0x33333333u) << (VU)2;
+    return x ^ ((x & (VU)0x55555555u) << (VU)1);
+}
+
+/// The words of `philox` for (any sample, pixel, depth, draw) become those of this sample: *c0 with *c3 and *c1 with *c2 are the
+/// coordinates of a two-dimensional Sobol' sequence over the samples of a pixel, in an order of its own, shifted digitally. What is
+/// added to the words does not depend on them, so those of one sample are as random as `philox` makes them.
+static void FN(sobol)(VU sample, VU pixel, VU depth, VU draw, uint2 key, VU* c0, VU* c1, VU* c2, VU* c3) {
+    VU seed = (pixel * (VU)0x9E3779B9u) ^ (depth * (VU)0x85EBCA6Bu) ^ (draw * (VU)0xC2B2AE35u) ^ (VU)key.x;
+    seed = (seed ^ (seed >> (VU)16)) * (VU)0x7FEB352Du + (VU)key.y;
+    seed = (seed ^ (seed >> (VU)15)) * (VU)0x846CA68Bu;
+    seed ^= seed >> (VU)16;
+    const VU number = FN(reverse)(sample), p = FN(nested)(number, seed), q = FN(nested)(number, seed * (VU)0x9E485565u + (VU)0x632BE59Bu);
+    *c0 ^= p;
+    *c3 ^= FN(sobol_second)(p);
+    *c1 ^= q;
+    *c2 ^= FN(sobol_second)(q);
+}
+#endif
+
+/// The words of one draw: by `philox` alone, or (CLUME_SOBOL) spread evenly over a pixel's samples.
+static void FN(draw)(VU sample, VU pixel, VU depth, VU draw, uint2 seed, VU* c0, VU* c1, VU* c2, VU* c3) {
+    *c0 = CLUME_SOBOL ? (VU)0xffffffffu : sample;
+    *c1 = pixel;
+    *c2 = depth;
+    *c3 = draw;
+    FN(philox)(c0, c1, c2, c3, seed);
+#if CLUME_SOBOL
+    FN(sobol)(sample, pixel, depth, draw, seed, c0, c1, c2, c3);
+#endif
+}
+
 /// floor(x · n / 2^32): uniform in [0, n) for 32 random bits, to within n 2^-32.
 static VU FN(uniform_index)(VU x, VU n) { return TO_U((TO_L(x) * TO_L(n)) >> (VL)32); }
 

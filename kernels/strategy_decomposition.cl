@@ -4,7 +4,7 @@
 #include "bvh.cl"
 
 static int flight_decomposition(float3 o, float3 d, float t_end, Flight* f, const Draws* r, SCENE_ARGS) {
-    const uint2 key = draw_bits(r, 0).xy;
+    const uint2 key = draw_key(r, 0);
     float best = t_end;
     uint primitive = CLUME_NO_PRIMITIVE;
 #if CLUME_ACCEL == ACCEL_CELLS

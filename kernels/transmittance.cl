@@ -76,7 +76,7 @@ static float transmittance_sampled(float3 o, float3 d, float t_end, const Draws*
     while (result == FLIGHT_PAUSED);
     if (result == FLIGHT_COLLIDED) weight = 0.0f;
 #else
-    if (decomposition_blocks(o, d, t_end, draw_bits(r, DRAW_SHADOW).xy, &f.work, SCENE)) weight = 0.0f;
+    if (decomposition_blocks(o, d, t_end, draw_key(r, DRAW_SHADOW), &f.work, SCENE)) weight = 0.0f;
 #endif
 #elif CLUME_SCENE_BOUND
     null_collisions_scene(CLUME_TRANSMITTANCE == TRANSMITTANCE_RATIO ? NULL_RATIO : NULL_RESIDUAL_RATIO, o, d, t_end, &f, &weight, r, SCENE);

@@ -322,6 +322,7 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     define("CLUME_TRANSMITTANCE", find_estimator(out.transmittance)->program);
     define("CLUME_SCENE_BOUND", out.bound == "scene");
     if (r.root_finding == "bisection") define("CLUME_BISECTION", 1);
+    define("CLUME_SOBOL", r.sobol);
     define("CLUME_ACCEL", wanted.bvh ? 2 : 1);
     define("CLUME_COUNT", options.count_work || out.strategy == "progressive");  // its look-ups are reported
     // Null collisions under the cells' bounds look at one primitive at a time: vectors are of rays, not of primitives.
@@ -352,6 +353,7 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     say("visible background", lights.visible_background ? "yes" : "left out");
     explain_grids(scene, voxels, out);
     say("colour", grey ? "one channel: everything is grey" : "RGB");
+    say("sampler", r.sobol ? "sobol: random numbers spread evenly over a pixel's samples" : "independent");
     say("depth limit", r.max_depth >= 0 ? std::to_string(r.max_depth) : "left out");
     return out;
 }

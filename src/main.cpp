@@ -72,6 +72,7 @@ ImageMetadata describe(const Scene& scene, const RenderCommand& command, const R
         {"samples", samples_held(stats)},
         {"sampleRange", fmt::format("{}:{}", options.sample_begin, end)},
         {"maxDepth", std::to_string(scene.render.max_depth)},
+        {"sampler", scene.render.sobol ? "sobol" : "independent"},
         {"strategy", stats.strategy},
         {"transmittance", stats.transmittance},
         {"bound", stats.bound},

@@ -165,6 +165,13 @@ std::vector<float> Probe::math(MathFunction f, std::span<const float> x, std::sp
     return values;
 }
 
+std::vector<Probe::Words> Probe::draws(std::span<const Words> counters, std::uint32_t seed_lo, std::uint32_t seed_hi) {
+    Impl& s = *impl_;
+    Buffer<Words> c(s.queue, counters), out(s.queue, counters.size());
+    s.run("probe_draw", counters.size(), c, cl_uint2{{seed_lo, seed_hi}}, out, cl_uint(counters.size()));
+    return out.download();
+}
+
 std::vector<Probe::Words> Probe::philox(std::span<const Words> counters, std::span<const Words> keys) {
     Impl& s = *impl_;
     Buffer<Words> c(s.queue, counters), k(s.queue, keys), out(s.queue, counters.size());

@@ -108,6 +108,8 @@ public:
     struct Words {
         std::uint32_t v[4];
     };
+    /// Those of draws (sample, pixel, depth, draw) under a seed.
+    std::vector<Words> draws(std::span<const Words> counters, std::uint32_t seed_lo, std::uint32_t seed_hi);
     std::vector<Words> philox(std::span<const Words> counters, std::span<const Words> keys);
     /// Bits of primitives first .. first + count under a key.
     std::vector<std::uint32_t> primitive_bits(std::uint32_t first, std::uint32_t key_lo, std::uint32_t key_hi, std::size_t count);

@@ -42,6 +42,7 @@ struct RenderSettings {
     std::string bound = "auto";           ///< of null collisions: scene, grid, tree
     std::optional<int> majorant_grid;     ///< cells along the longest axis of the `grid` bound and of `progressive`
     std::string root_finding = "newton";  ///< of regular tracking among several primitives: newton, bisection
+    bool sobol = false;                   ///< random numbers spread evenly over a pixel's samples, not independent
     LightSampling light_sampling = LightSampling::mis;
     std::optional<double> step;  ///< marching only, world units; default: smallest kernel scale / 4
 };

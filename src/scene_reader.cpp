@@ -150,6 +150,7 @@ RenderSettings read_render(const SectionReader& section) {
     out.bound = section.text("bound");
     if (section.given("majorant_grid")) out.majorant_grid = static_cast<int>(section.integer("majorant_grid"));
     out.root_finding = section.text("root_finding");
+    out.sobol = section.text("sampler") == "sobol";
     const std::string sampling = section.text("light_sampling");
     out.light_sampling = sampling == "nee"     ? LightSampling::nee
                          : sampling == "phase" ? LightSampling::phase

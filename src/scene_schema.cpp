@@ -46,6 +46,7 @@ constexpr KeySpec table[] = {
     {"render", "bound", "", T::choice, 0, false, "\"auto\"", "", "auto scene grid tree", "", "of null collisions: one for the scene, one per cell of a uniform grid, or per node of an octree"},
     {"render", "majorant_grid", "", T::integer, 0, false, "", "[1,1024]", "", "cells", "along the longest axis of the `grid` bound and of `progressive`; default: by a cost model"},
     {"render", "root_finding", "", T::choice, 0, false, "\"newton\"", "", "newton bisection", "", "of `regular` where several primitives overlap; both are exact to rounding"},
+    {"render", "sampler", "", T::choice, 0, false, "\"independent\"", "", "independent sobol", "", "random numbers of a pixel's samples: `independent`, or spread evenly (`sobol`), which makes less noise, the most where `spp` is a power of two"},
     {"render", "light_sampling", "", T::choice, 0, false, "\"mis\"", "", "mis nee phase", "", "`mis`: both ways, weighted; `nee`: light sampling alone; `phase`: none, not with point, spot or directional lights"},
     {"render", "step", "", T::number, 0, false, "", "(0,inf)", "", "world units", "of marching only; default: the smallest kernel scale / 4"},
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-# The stages of `./clume test --deep`, for tests/stages.sh: every vector width on every implementation; every kernel under
+# The stages of `./clume test --deep` (and --tsan), for tests/stages.sh: every vector width on every implementation; every kernel under
 # Oclgrind's checks; the host's code under the sanitizers; clang's warnings and clang-tidy over every file.
+
+jobs=$(nproc)
 
 # A stage without Catch2: what COMMAND says is a failure, saying nothing is passing.
 clean() {
@@ -52,17 +54,16 @@ tidy() {
         (cd -- "$root" && xargs -P "$jobs" -n 1 clang-tidy -p "$build/release" --quiet --extra-arg=-Wno-unknown-warning-option 2>/dev/null)
 }
 
-jobs=$(nproc)
-stage 'every width on every implementation' on_all "$tests" '[.deep]'
-if command -v oclgrind >/dev/null; then
-    stage "every kernel under Oclgrind's checks" clean under_oclgrind
-fi
-stage 'AddressSanitizer and UndefinedBehaviorSanitizer' under_asan
-if grep -q '"name": "tsan"' "$root/CMakePresets.json"; then
-    stage 'ThreadSanitizer over the dispatcher' under_tsan
-fi
-if command -v clang-tidy >/dev/null; then
-    stage 'clang-tidy' clean tidy
-else
-    skip 'clang-tidy (not installed)'
-fi
+# Every width on every implementation, then the checkers; ThreadSanitizer is a stage of its own.
+deep_stages() {
+    stage 'every width on every implementation' on_all "$tests" '[.deep]'
+    if command -v oclgrind >/dev/null; then
+        stage "every kernel under Oclgrind's checks" clean under_oclgrind
+    fi
+    stage 'AddressSanitizer and UndefinedBehaviorSanitizer' under_asan
+    if command -v clang-tidy >/dev/null; then
+        stage 'clang-tidy' clean tidy
+    else
+        skip 'clang-tidy (not installed)'
+    fi
+}

@@ -46,11 +46,11 @@ void add_lights(Scene& scene) {
 
 std::span<const MethodCase> method_cases() {
     static const MethodCase cases[] = {
-        {{"delta", "analytic", "tree", "newton", "bvh"}, true},
+        {{"delta", "analytic", "tree", "newton", "bvh", "sobol"}, true},
         {{"delta", "ratio", "grid"}, true},
         {{"delta", "residual-ratio", "scene"}, true},
         {{"decomposition", "analytic", "auto", "newton", "cells"}, false},
-        {{"decomposition", "binary", "auto", "newton", "bvh"}, false},
+        {{"decomposition", "binary", "auto", "newton", "bvh", "sobol"}, false},
         {{"regular", "residual-ratio", "tree"}, true},
         {{"regular", "analytic", "auto", "bisection", "cells"}, true},
         {{"regular-linear", "march"}, true},
@@ -93,6 +93,7 @@ DeviceScene packed(const Scene& scene, const Pair& pair) {
     s.render.transmittance = pair.estimator;
     s.render.bound = pair.bound;
     s.render.root_finding = pair.root;
+    s.render.sobol = pair.sobol();
     RenderOptions options;
     options.accelerator = pair.accelerator;
     return make_device_scene(s, options);
@@ -116,6 +117,7 @@ Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t cou
     std::vector<Probe::Words> counters(count), keys(count);
     for (std::size_t i = 0; i < count; ++i)
         for (int k = 0; k < 4; ++k) counters[i].v[k] = random.word(), keys[i].v[k] = random.word();
+    keep(out, "probe_draw", sobol_probe(device, width).draws(counters, 17, 19));
     keep(out, "probe_philox", probe.philox(counters, keys));
     keep(out, "probe_primitive_bits", probe.primitive_bits(3, 17, 19, count));
     for (const cases::PhaseCase& phase : cases::phases)

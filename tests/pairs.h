@@ -13,14 +13,16 @@ namespace clume::test {
 
 /// A program: what is drawn by which strategy, what lights are seen through by which estimator.
 struct Pair {
-    const char *strategy, *estimator = "analytic", *bound = "auto", *root = "newton", *accelerator = "auto";
-    std::string name() const { return fmt::format("{} {} {} {} {}", strategy, estimator, bound, root, accelerator); }
+    const char *strategy, *estimator = "analytic", *bound = "auto", *root = "newton", *accelerator = "auto", *sampler = "independent";
+    std::string name() const { return fmt::format("{} {} {} {} {} {}", strategy, estimator, bound, root, accelerator, sampler); }
+    bool sobol() const { return std::string_view(sampler) == "sobol"; }
 };
 
 inline RenderResult render_pair(const Pair& pair, Scene scene, std::uint32_t spp, std::uint64_t seed, const RenderOptions& options = {}) {
     scene.render.transmittance = pair.estimator;
     scene.render.bound = pair.bound;
     scene.render.root_finding = pair.root;
+    scene.render.sobol = pair.sobol();
     return render_by({pair.strategy, pair.accelerator}, scene, spp, seed, options);
 }
 

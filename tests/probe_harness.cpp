@@ -16,6 +16,12 @@ Probe& bare_probe(int width) {
     return all.try_emplace(width, test_device(), width).first->second;
 }
 
+Probe sobol_probe(const DeviceInfo& device, int width) {
+    DeviceScene scene;
+    scene.defines.emplace_back("CLUME_SOBOL", "1");
+    return Probe(device, scene, width);
+}
+
 std::vector<float> log_spaced(float lo, float hi, std::size_t count, std::uint64_t seed) {
     TestRandom random(seed);
     std::vector<float> x{lo, hi, std::nextafter(lo, hi), std::nextafter(hi, lo)};

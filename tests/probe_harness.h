@@ -25,6 +25,9 @@ const DeviceInfo& test_device();
 /// A probe without a scene, kept for the life of the process.
 Probe& bare_probe(int width);
 
+/// A probe of the program that spreads random numbers evenly.
+Probe sobol_probe(const DeviceInfo& device, int width);
+
 /// Index of the first element whose bytes differ between two arrays of equal size, or their size.
 template <class T>
 std::size_t first_difference(const std::vector<T>& a, const std::vector<T>& b) {

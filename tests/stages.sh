@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # The tests again and again: what `./clume test` does beside one run of clume_tests.
-#   tests/stages.sh [--all-implementations] [--fuzz[=SECONDS]] [--deep] [ARGS]     ARGS go to the first run's Catch2
+#   tests/stages.sh [--all-implementations] [--tsan] [--fuzz[=SECONDS]] [--deep] [ARGS]     ARGS go to the first run's Catch2
 # --all-implementations  the tests of the kernels on Intel's CPU runtime, then all implementations beside each other
 # --fuzz[=SECONDS]       every reader of files, for 20 s each: tests/fuzz/run.sh
+# --tsan                 the dispatcher under ThreadSanitizer
 # --deep                 all that, every width, and the checkers: tests/deep.sh
 # What can't be had (no network, no such package) is skipped, and said in the closing line, which adds up those of all stages.
 set -euo pipefail
@@ -35,13 +36,14 @@ skip() {
     skipped+=("$1")
 }
 
-all=0 deep=0 fuzz=0 arguments=()
+all=0 deep=0 fuzz=0 tsan=0 arguments=()
 for argument; do
     case $argument in
         --all-implementations) all=1 ;;
+        --tsan) tsan=1 ;;
         --fuzz) fuzz=20 ;;
         --fuzz=*) fuzz=${argument#*=} ;;
-        --deep) all=1 deep=1 ;;
+        --deep) all=1 deep=1 tsan=1 ;;
         *) arguments+=("$argument") ;;
     esac
 done
@@ -60,7 +62,9 @@ if ((all)); then
 fi
 ((deep == 0 || fuzz > 0)) || fuzz=20
 if ((fuzz)); then stage 'fuzzing the readers' "$root/tests/fuzz/run.sh" "$fuzz"; fi
-if ((deep)); then source "$root/tests/deep.sh"; fi
+source "$root/tests/deep.sh"
+if ((tsan)); then stage 'ThreadSanitizer over the dispatcher' under_tsan; fi
+if ((deep)); then deep_stages; fi
 
 printf '\n%s passed, %s failed' "$passed" "$failed"
 ((${#skipped[@]} == 0)) || printf ', %s skipped: %s' "${#skipped[@]}" "$(printf '%s; ' "${skipped[@]}" | sed 's/; $//')"

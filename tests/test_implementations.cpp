@@ -100,7 +100,8 @@ TEST_CASE("Implementations.SpecialisedProgramsGiveTheSameBits", "[.][implementat
     Outputs reference;
     for (const DeviceInfo& device : one_of_each())
         for (const int width : kAllWidths) {  // its paths go side by side
-            const Outputs got = run_method(device, width, hardly_anything(), {"delta"}, interprets(device) ? 0 : kMany);
+            Outputs got;
+            for (const char* sampler : {"independent", "sobol"}) got.merge(run_method(device, width, hardly_anything(), {"delta", "analytic", "auto", "newton", "auto", sampler}, interprets(device) ? 0 : kMany));
             if (reference.empty()) reference = got;
             INFO(device.label() << ", width " << width);
             check_same_words(reference, got);
@@ -169,7 +170,7 @@ TEST_CASE("EntryPoints.AreAllRun", "[.][entry]") {
     all.merge(run_stress_kernels(device, 8));
     for (const int width : {1, 4}) all.merge(run_bench_kernels(device, width));
     for (const MethodCase& c : method_cases()) all.merge(run_method(device, 4, scene_of(c), c.pair, 8));
-    for (const int width : {1, 4}) all.merge(run_method(device, width, hardly_anything(), {"delta"}, 8));
+    for (const int width : {1, 4}) all.merge(run_method(device, width, hardly_anything(), {"delta", "analytic", "auto", "newton", "auto", width == 4 ? "sobol" : "independent"}, 8));
     std::size_t kernels = 0;
     for (const EmbeddedFile& file : embedded_kernels()) {
         const std::string text(file.text);
