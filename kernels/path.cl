@@ -3,6 +3,10 @@
 // MIS (balance heuristic), scattering. A path lives in PathState between launches.
 #include "lamp.cl"
 
+#ifndef CLUME_LIGHT_ROULETTE  // light of less than this share of what an isotropic phase function would leave goes on by roulette
+#define CLUME_LIGHT_ROULETTE 0.5f
+#endif
+
 #define PATH_ALIVE 1u
 #define PATH_ALPHA 2u  // the camera ray met something
 
@@ -52,6 +56,14 @@ static bool path_light_sample(float3 x, float3 d, uint phase, float g, const Dra
     const float scattered = phase_value_s(phase, g, phase_versine(g, d, s->direction));
     const float weight = (lights[s->light].kind & CLUME_HITS) ? divide_s(s->pdf, s->pdf + scattered) : 1.0f;
     *value = s->value * (scattered * weight);
+#if CLUME_PHASES & PHASE_HENYEY_GREENSTEIN
+    // A shadow ray costs the same whatever it brings.
+    const float chance = scattered * weight * (4.0f * CLUME_PI / CLUME_LIGHT_ROULETTE);
+    if (chance < 1.0f) {
+        if (uniform_s(draw_bits(r, DRAW_LIGHT_MORE).z) >= chance) return false;
+        *value *= rcp_s(chance);
+    }
+#endif
     *word = bits.w;
     return true;
 }

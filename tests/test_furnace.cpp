@@ -76,6 +76,22 @@ TEST_CASE("WhiteFurnace.MeanOneWithLightSampling") {
             }
 }
 
+TEST_CASE("WhiteFurnace.MeanOneWithRouletteOnDimLight") {
+    // Peaked forward or backward, most of the light that is sampled is worth little: its shadow rays are left to roulette.
+    for (const double g : {0.7, -0.8})
+        for (const LightSampling sampling : {LightSampling::nee, LightSampling::mis}) {
+            Scene scene = white_furnace(KernelFamily::gaussian, 2, false);
+            scene.film = {8, 8};
+            scene.media[0].phase = {PhaseKind::henyey_greenstein, g};
+            scene.render.light_sampling = sampling;
+            // As an image it is sampled by `mis`, too.
+            scene.lights[0].kind = LightKind::envmap;
+            scene.lights[0].image.width = scene.lights[0].image.height = 2;
+            scene.lights[0].image.rgb.assign(12, 1.0f);
+            for (const Way& way : {delta, decomposition_bvh}) check_mean_one(way, "white_furnace_dim_light", scene, 2048);
+        }
+}
+
 TEST_CASE("WhiteFurnace.ImageOfOneIsAConstant") {
     // As an environment image the same light takes MIS, whose two halves must add up to 1.
     for (double density : {1.0, 10.0}) {
