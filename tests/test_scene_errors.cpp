@@ -79,6 +79,7 @@ TEST_CASE("Scene.TypesAndRanges", "[quick]") {
 
 TEST_CASE("Scene.CameraAndFilmChecks", "[quick]") {
     check_error("[0, 0, -4]", "[0, 0, 0]", "s.json:2:46: the camera's target must not be its origin");
+    check_error("[0, 0, -4]", "[0, 0, -1e200]", "s.json:2:51: the camera's target is too far from its origin");
     check_error(camera, camera + ", \"up\": [0, 0, -2]", "s.json:2:64: \"up\" is parallel");
     check_error(camera, camera + ", \"up\": [0, 0, 0]", "s.json:2:64: \"up\" must not be zero");
     check_error(camera, camera + ", \"fov\": 180", "s.json:2:65: \"fov\" must be in (0,180)");
