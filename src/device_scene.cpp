@@ -215,6 +215,7 @@ Normalization normalize(const Scene& scene) {
     if (box.lo.x > box.hi.x) return n;
     n.center = 0.5 * (box.lo + box.hi);
     n.radius = 0.5 * glm::length(box.hi - box.lo);
+    if (!std::isfinite(n.radius)) throw SceneError(fmt::format("{}: what is in the scene reaches too far for double precision", scene.path));
     if (!(n.radius > 0)) n.radius = 1;
     n.scale = std::exp2(-std::floor(std::log2(n.radius)));
     return n;

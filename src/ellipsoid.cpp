@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <numbers>
 
+#include "src/error.h"
 #include "src/parallel.h"
 
 namespace clume {
@@ -37,6 +39,10 @@ glm::dvec3 apply_transposed(const double* w, const glm::dvec3& y) {
     return {w[0] * y.x, w[1] * y.x + w[3] * y.y, w[2] * y.x + w[4] * y.y + w[5] * y.z};
 }
 
+[[noreturn]] void fail_range(const EllipsoidMedium& medium, const Primitive& p, const std::string& what) {
+    throw SceneError(fmt::format("{}: the primitive at ({:g}, {:g}, {:g}) is outside single precision: {}", medium.source, p.center.x, p.center.y, p.center.z, what));
+}
+
 }  // namespace
 
 std::vector<Ellipsoid> make_ellipsoids(const Scene& scene, const Normalization& n) {
@@ -66,6 +72,9 @@ std::vector<Ellipsoid> make_ellipsoids(const Scene& scene, const Normalization& 
                 // Float evaluation is off by some ulp of |W| times the lengths involved (primitive's own and scene's).
                 double norm2 = 0;
                 for (double v : e.w) norm2 += v * v;
+                if (!(norm2 <= most_whitening * most_whitening)) fail_range(medium, p, fmt::format("a scale less than {:g} of the scene's radius {:g}", 1 / most_whitening, n.radius));
+                if (!(e.sigma <= most_extinction))
+                    fail_range(medium, p, fmt::format("extinction {:g} over the scene's radius {:g} is an optical depth above {:g}", p.sigma_t * medium.density_scale, n.radius, most_extinction));
                 glm::dvec3 row2(0.0);
                 for (int k = 0; k < 3; ++k) row2 += axes[k] * axes[k];
                 const double longest = std::sqrt(row2.x + row2.y + row2.z);

@@ -35,7 +35,13 @@ struct Normalization {
     double radius = 1;  ///< of the media and area lights about center, world units
 };
 
-/// Whitened, normalised primitives of all media, in file order, media one after the other.
+/// Most extinction of a primitive, per normalised length: 2³² of them still add up in single precision.
+inline constexpr double most_extinction = 1e28;
+/// Greatest |W|, so least scale about its inverse: |W d|² must fit in single precision.
+inline constexpr double most_whitening = 1e18;
+
+/// Whitened, normalised primitives of all media, in file order, media one after the other. Throws SceneError where single
+/// precision can't hold one.
 std::vector<Ellipsoid> make_ellipsoids(const Scene& scene, const Normalization& n);
 
 /// The box of all dilated supports; empty media give lo > hi.

@@ -119,8 +119,9 @@ class TreeBuilder : public rapidjson::BaseReaderHandler<rapidjson::UTF8<>, TreeB
         return true;
     }
     bool String(const char* text, rapidjson::SizeType length, bool) {
-        scalar(JsonType::string)->text.assign(text, length);
-        return true;
+        JsonValue& value = *scalar(JsonType::string);
+        value.text.assign(text, length);
+        return no_surrogate(value.text, value.at);
     }
     bool RawNumber(const char*, rapidjson::SizeType, bool) {
         cursor_.skip_separators();
@@ -139,9 +140,9 @@ class TreeBuilder : public rapidjson::BaseReaderHandler<rapidjson::UTF8<>, TreeB
     }
     bool Key(const char* text, rapidjson::SizeType length, bool) {
         cursor_.skip_separators();
-        open_.back()->members.push_back({std::string(text, length), cursor_.position(), {}});
+        const JsonMember& member = open_.back()->members.emplace_back(JsonMember{std::string(text, length), cursor_.position(), {}});
         cursor_.move_to(stream_.Tell());
-        return true;
+        return no_surrogate(member.key, member.at);
     }
     bool StartObject() { return open(JsonType::object); }
     bool StartArray() { return open(JsonType::array); }
@@ -182,6 +183,12 @@ class TreeBuilder : public rapidjson::BaseReaderHandler<rapidjson::UTF8<>, TreeB
         closed_ = open_.back();
         open_.pop_back();
         return true;
+    }
+    /// The parser lets an escaped trailing surrogate without its leading one through, as three bytes that no UTF-8 has.
+    bool no_surrogate(std::string_view text, JsonPosition at) {
+        for (std::size_t i = 0; i + 1 < text.size(); ++i)
+            if (text[i] == '\xed' && static_cast<unsigned char>(text[i + 1]) >= 0xa0) failure = Failure{at, "half of a surrogate pair in a string"};
+        return !failure;
     }
     bool keys_unique(const JsonValue& object) {
         std::vector<std::size_t> order(object.members.size());

@@ -102,10 +102,11 @@ class Reader {
                     read_ascii(sink);
                 else
                     read_binary(sink);
-                return;
+            } else {
+                skip(element);
             }
-            skip(element);
         }
+        check_end();
     }
 
   private:
@@ -227,6 +228,11 @@ class Reader {
         }
     }
 
+    void check_end() {
+        std::string_view line;
+        if (format_ == Format::ascii ? next_row(line) : at_ < bytes_.size()) fail("the file holds more than its header says");
+    }
+
     void read_binary(const Sink& sink) {
         check_count(*vertex_);
         const std::uint64_t count = vertex_->count;
@@ -259,6 +265,7 @@ class Reader {
             }
             sink(decode(values, row), row, count);
         }
+        if (!vertex_->has_lists) at_ += count * vertex_->row_bytes;
     }
 
     /// The next line that isn't blank.

@@ -118,8 +118,8 @@ Camera read_camera(const SectionReader& section) {
         camera.fov_rad = glm::radians(section.number("fov"));
     }
     const glm::dvec3 view = camera.target - camera.origin;
-    if (!(glm::length(view) > 0) || !std::isfinite(glm::length(view)))
-        section.fail("target", "the camera's target must not be its origin");
+    if (!(glm::length(view) > 0)) section.fail("target", "the camera's target must not be its origin");
+    if (!std::isfinite(glm::length(view))) section.fail("target", "the camera's target is too far from its origin for double precision");
     if (!(glm::length(camera.up) > 0)) section.fail("up", "\"up\" must not be zero");
     if (parallel(view, camera.up))
         section.fail(section.given("up") ? "up" : "target", "\"up\" is parallel to the view direction");

@@ -52,7 +52,7 @@ constexpr KeySpec table[] = {
 
     {"media", "type", "", T::choice, 0, true, "", "", "ellipsoids grid", "", "a mixture of ellipsoids, or voxels"},
     {"media", "kernel", "ellipsoids", T::choice, 0, true, "", "", "gaussian epanechnikov uniform", "", "density over distance from the centre"},
-    {"media", "extent", "ellipsoids", T::number, 0, false, "", "(0,inf)", "", "scales", "support radius; default: 3 gaussian, √7 epanechnikov, √5 uniform"},
+    {"media", "extent", "ellipsoids", T::number, 0, false, "", "[1e-15,1e15]", "", "scales", "support radius; default: 3 gaussian, √7 epanechnikov, √5 uniform"},
     {"media", "normalization", "ellipsoids", T::choice, 0, false, "\"peak\"", "", "peak mass", "", "what a density means: extinction at the centre, or its integral over space"},
     {"media", "file", "ellipsoids", T::string, 0, false, "", "", "", "", "a PLY file; this or `primitives`"},
     {"media", "primitives", "ellipsoids", T::list, 0, false, "", "", "", "", "a list of primitives; this or `file`"},

@@ -12,6 +12,7 @@
 #include <set>
 #include <string>
 
+#include "src/device_scene.h"
 #include "src/environment_reader.h"
 #include "src/error.h"
 #include "src/memory_bound.h"
@@ -157,6 +158,30 @@ TEST_CASE("Binary.AFileNamedOftenIsHeldWithinTheLimit") {
     Process process({"render", "often.json", "--memory-limit", "400M", "--quiet"}, folder.path);
     CHECK(process.wait() == 3);
     CHECK_THAT(process.err, Catch::Contains("the files up to here hold"));
+}
+
+TEST_CASE("HostileFiles.WhatSinglePrecisionCantHoldIsRefused", "[quick]") {
+    const MemoryLimit limit(std::uint64_t{600} << 20);
+    const auto pack = [](const std::string& primitives, const std::string& keys = "") {
+        return error_of([&] {
+            make_device_scene(parse_scene(R"({"camera":{"origin":[0,0,-4],"target":[0,0,0]},"lights":[{"type":"constant","radiance":1}],"media":[{"type":"ellipsoids","kernel":"gaussian",)" +
+                                              keys + "\"primitives\":[" + primitives + "]}]}",
+                                          "s.json"),
+                              {});
+        });
+    };
+    const std::string sound = R"({"center":[0,0,0],"scale":0.3,"density":1})";
+    CHECK(pack(sound).empty());
+    CHECK(pack(R"({"center":[0,0,0],"scale":0.3,"density":1e27})").empty());
+    CHECK(pack(sound + R"(,{"center":[0,0,0],"scale":1e-15,"density":1})").empty());
+    check(pack(sound + R"(,{"center":[0,0,0.1],"scale":0.3,"density":1e308})"), "the primitive at (0, 0, 0.1) is outside single precision: extinction 1e+308");
+    check(pack(R"({"center":[0,0,0],"scale":0.3,"density":1e200})", R"("density_scale":1e200,)"), "extinction inf");
+    check(pack(R"({"center":[0,0,0],"scale":1e39,"density":1})"), "is an optical depth above 1e+28");
+    check(pack(R"({"center":[0,0,0],"scale":[1e39,1,1e-39],"density":1})"), "a scale less than 1e-18");
+    check(pack(sound + R"(,{"center":[1e30,0,0],"scale":1,"density":1})"), "a scale less than 1e-18");
+    check(pack(R"({"center":[1.7e308,0,0],"scale":1,"density":1},{"center":[-1.7e308,0,0],"scale":1,"density":1})"), "s.json: what is in the scene reaches too far");
+    for (const char* extent : {"1e300", "1e100", "1e-300"}) check(pack(sound, std::string("\"extent\":") + extent + ","), "must be in [1e-15,1e15]");
+    for (const char* extent : {"1e15", "1e-15"}) CHECK(pack(sound, std::string("\"extent\":") + extent + ",").empty());
 }
 
 TEST_CASE("HostileFiles.HeadersOfManyNamesTakeNoTime", "[quick]") {

@@ -99,6 +99,9 @@ TEST_CASE("Json.RefusesBadInputAtItsPlace", "[quick]") {
     check("\xEF\xBB\xBF{}", "f:1:1: the file begins with a byte-order mark");
     check("[\"\xC3\x28\"]", "f:1:");      // not UTF-8
     check("[\"\xED\xA0\x80\"]", "f:1:");  // a surrogate
+    check(R"(["", "\uDC00"])", "f:1:6: half of a surrogate pair in a string");
+    check(R"({"a\uDFFFb": 1})", "f:1:2: half of a surrogate pair in a string");
+    CHECK(parse_json(R"(["\uD83C\uDF2B\uD7FF"])", "f").items[0].text == "\xF0\x9F\x8C\xAB\xED\x9F\xBF");
     check("[\"\xC0\xAF\"]", "f:1:");      // overlong
     check("[\"\\ud800\"]", "f:1:");       // half a pair
     check("[\"a\nb\"]", "f:1:");          // a raw control character

@@ -282,8 +282,8 @@ TEST_CASE("Ply.CutShortAtEveryByteIsAnError", "[quick]") {
     for (const char* format : formats)
         for (const bool around : {false, true}) {
             const std::string bytes = ply_file(format, columns(), around);
-            // The element after the vertices isn't read; cut before the vertices end.
-            const std::size_t tail = around ? 12 : format == formats[0] ? 26 : 0;
+            // A cut inside the last line of text may leave a good one.
+            const std::size_t tail = format != formats[0] ? 0 : around ? 12 : 26;
             for (std::size_t size = 0; size + tail < bytes.size(); size += 3) {
                 INFO(format << " " << around << " " << size << " of " << bytes.size());
                 CHECK_FALSE(error_of(bytes.substr(0, size)).empty());
@@ -292,6 +292,19 @@ TEST_CASE("Ply.CutShortAtEveryByteIsAnError", "[quick]") {
     const std::string bytes = ply_file("binary_little_endian", columns());
     contains(error_of(bytes.substr(0, bytes.size() - 1)), "a.ply: needs 204 bytes for 3 vertices, holds 203");
     contains(error_of(bytes + "x"), "a.ply: needs 204 bytes for 3 vertices, holds 205");
+}
+
+TEST_CASE("Ply.MoreThanTheHeaderSaysIsAnError", "[quick]") {
+    for (const char* format : formats)
+        for (const bool around : {false, true}) {
+            INFO(format << " " << around);
+            const std::string bytes = ply_file(format, columns(), around);
+            CHECK(error_of(bytes).empty());
+            CHECK_FALSE(error_of(bytes + "1").empty());
+            if (format != formats[0]) continue;
+            CHECK(error_of(bytes + " \n\n").empty());
+            contains(error_of(bytes + "\n1\n"), "the file holds more than its header says");
+        }
 }
 
 TEST_CASE("Ply.HeaderPromisingMoreIsRefusedWithoutAllocating", "[quick]") {

@@ -79,6 +79,7 @@ TEST_CASE("Scene.TypesAndRanges", "[quick]") {
 
 TEST_CASE("Scene.CameraAndFilmChecks", "[quick]") {
     check_error("[0, 0, -4]", "[0, 0, 0]", "s.json:2:46: the camera's target must not be its origin");
+    check_error("[0, 0, -4]", "[0, 0, -1e200]", "s.json:2:51: the camera's target is too far from its origin");
     check_error(camera, camera + ", \"up\": [0, 0, -2]", "s.json:2:64: \"up\" is parallel");
     check_error(camera, camera + ", \"up\": [0, 0, 0]", "s.json:2:64: \"up\" must not be zero");
     check_error(camera, camera + ", \"fov\": 180", "s.json:2:65: \"fov\" must be in (0,180)");
@@ -148,7 +149,7 @@ TEST_CASE("Scene.MediaChecks", "[quick]") {
     medium(R"("phase": {"type": "henyey-greenstein"},)", "s.json:6:59: missing key \"g\" in phase");
     medium(R"("phase": {"type": "henyey-greenstein", "g": 1},)", "s.json:6:94: \"g\" must be in (-1,1)");
     medium(R"("phase": {"type": "mie"},)", "s.json:6:68: unknown type \"mie\"; known: isotropic, henyey-greenstein, rayleigh");
-    medium(R"("extent": 0,)", "s.json:6:60: \"extent\" must be in (0,inf)");
+    medium(R"("extent": 0,)", "s.json:6:60: \"extent\" must be in [1e-15,1e15]");
     medium(R"("file": "a.ply",)", "s.json:7:21: \"file\" and \"primitives\" exclude");
     medium(R"("scale_encoding": "log",)", "s.json:6:68: \"scale_encoding\" speaks about a file");
     check_error("\"gaussian\"", "\"gausian\"", "s.json:6:39: unknown kernel \"gausian\"", "did you mean \"gaussian\"?");
