@@ -151,7 +151,7 @@ Structures structures_of(const DeviceScene& out, bool shadow_rays, bool lamps, c
 }
 
 /// Builds what is wanted; says what it is.
-std::string build_structures(const Structures& wanted, const TreeSource& tree, std::optional<int> majorant_grid, DeviceScene& out) {
+std::string build_structures(const Structures& wanted, const TreeSource& tree, std::optional<int> majorant_grid, bool kept_cells, DeviceScene& out) {
     std::string text;
     if (wanted.references || wanted.cell_groups) {
         const bool densities = wanted.scene_bound || out.strategy == "progressive";
@@ -166,7 +166,7 @@ std::string build_structures(const Structures& wanted, const TreeSource& tree, s
             o.max_levels = 0;
             o.roots = majorant_grid;
         }
-        const Cells cells = cached_cells(out.ellipsoids, tree, o, cells_folder());
+        const Cells cells = cached_cells(out.ellipsoids, tree, o, kept_cells ? cells_folder() : std::filesystem::path());
         pack_cells(cells, wanted.cell_groups, wanted.references, out);
         text = fmt::format("{}x{}x{} cells, {} octree levels, {} leaves, {:.1f} references per primitive", cells.roots.x, cells.roots.y,
                            cells.roots.z, cells.levels, cells.leaves.size(), n ? static_cast<double>(cells.references) / static_cast<double>(n) : 0.0);
@@ -259,7 +259,7 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     const std::size_t lamps = with_structures && (lights.nee & (LIGHT_POINT | LIGHT_SPOT)) ? mark_lamps(scene, tree(), out) : 0;
     const Structures wanted = with_structures ? structures_of(out, lights.nee != 0, lamps > 0, options) : Structures{};
     std::string accelerator;
-    if (with_structures) accelerator = build_structures(wanted, tree, r.majorant_grid, out);
+    if (with_structures) accelerator = build_structures(wanted, tree, r.majorant_grid, options.kept_cells, out);
     else pack_primitives(out);
     const GridTraits voxels = pack_grids(scene, out);
     Box bounds = bounds_of(out.ellipsoids);

@@ -3,6 +3,8 @@
 // majorant hold everywhere in the cell, empty cells know their distance, and threads change nothing.
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <fmt/format.h>
 #include <sched.h>
 
@@ -326,4 +328,20 @@ TEST_CASE("Cells.AreKept", "[quick]") {
     (void)cached_cells(moved, count_tree, options, folder.path(), 0);
     CHECK(files() == 3);
     CHECK(encode_cells(cached_cells(scene.ellipsoids, count_tree, options, {}, 0)) == built);
+}
+
+TEST_CASE("Cells.AreBuiltWhereBuildingIsMeasured", "[quick]") {
+    // As benchmarks ask for it: neither kept nor taken from what was.
+    const clume::test::TempFolder cache;
+    const char* before = std::getenv("XDG_CACHE_HOME");
+    const std::string old = before ? before : "";
+    setenv("XDG_CACHE_HOME", cache.path().c_str(), 1);
+    RenderOptions options;
+    options.kept_cells = false;
+    const Scene scene = reference::ball_scene_n(20000);  // more than 50 ms
+    const DeviceScene built = make_device_scene(scene, options);
+    CHECK_FALSE(std::filesystem::exists(cells_folder()));
+    CHECK(make_device_scene(scene, {}).hash() == built.hash());
+    if (before) setenv("XDG_CACHE_HOME", old.c_str(), 1);
+    else unsetenv("XDG_CACHE_HOME");
 }
