@@ -201,7 +201,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     }
     render->add_option("--sample-range", texts.sample_range, "only samples A to B - 1 of each pixel")->type_name("A:B");
     render->add_option("--crop", texts.crop, "only this part of the film, half-open")->type_name("x0,y0,x1,y1");
-    render->add_option("--time-limit", texts.time_limit_s, "stop after this long and write what is done")->type_name("SECONDS");
+    render->add_option("--time-limit", texts.time_limit_s, "sample no longer than this and write what is done; building and compiling come on top")->type_name("SECONDS");
     render->add_option("--noise-threshold", texts.noise_threshold, "give each tile only the samples it needs for this standard error relative to its mean, such as 0.02; --spp at most")
         ->type_name("E");
     render->add_option("--kernel-timeout", texts.kernel_timeout_s, "a device silent for so long hangs and is given up; default 120; 0: never")->type_name("SECONDS");
