@@ -109,6 +109,13 @@ void refuse_leftovers(const CLI::App& app, const CLI::App* top) {
     throw UsageError(where + "unknown flag '" + name + "'; the nearest is '" + nearest_flag(name, flag_names(app)) + "'");
 }
 
+/// A variable of the shell that isn't set makes an empty value: a mistake, not the default.
+void refuse_empty(const CLI::App& app) {
+    for (const CLI::Option* option : app.parse_order())
+        for (const std::string& value : option->results())
+            if (value.empty() && !option->get_positional()) throw UsageError(app.get_name() + ": " + option->get_name() + ": its value is empty");
+}
+
 /// The arguments as a shell would take them again.
 std::string command_line(int argc, const char* const* argv) {
     std::string line = "clume";
@@ -302,7 +309,10 @@ Command parse_command_line(int argc, const char* const* argv) {
     }
     refuse_leftovers(app, nullptr);
     for (const CLI::App* sub : {render, compare, devices, info, bake, stress})
-        if (sub->parsed()) refuse_leftovers(*sub, &app);
+        if (sub->parsed()) {
+            refuse_leftovers(*sub, &app);
+            refuse_empty(*sub);
+        }
     if (app.get_subcommands().size() > 1) throw UsageError("one subcommand at a time");
 
     if (render->parsed()) {
