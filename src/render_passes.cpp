@@ -88,10 +88,11 @@ void Renderer::Impl::run_pass(Accumulation::State& a, FilmSums& sums, PassWork w
     setup.warnings.insert(setup.warnings.end(), report.warnings.begin(), report.warnings.end());
     for (std::size_t k = report.workers.size(); k-- > 0;) {
         const WorkerReport& w = report.workers[k];
-        const auto share = std::find_if(a.devices.begin(), a.devices.end(), [&](const DeviceShare& d) { return d.name == w.name; });
-        if (share != a.devices.end()) share->busy_s += w.busy_s;
-        else a.devices.insert(a.devices.begin(), DeviceShare{w.name, 0, w.busy_s});
         const auto& renderer = static_cast<const DeviceRenderer&>(*workers[k]);
+        auto share = std::find_if(a.devices.begin(), a.devices.end(), [&](const DeviceShare& d) { return d.name == w.name; });
+        if (share == a.devices.end()) share = a.devices.insert(a.devices.begin(), DeviceShare{w.name, 0, 0});
+        share->paths += renderer.paths();
+        share->busy_s += w.busy_s;
         if (const std::size_t items = renderer.short_of_memory(); items > 0 && told_short_of_memory.insert(w.name).second)
             setup.warnings.push_back(fmt::format("device {} is short of memory: batches of at most {} paths at a time", w.name, items));
         for (std::size_t i = 0; i < a.raised.size(); ++i) a.raised[i] = std::max(a.raised[i], renderer.raised()[i]);

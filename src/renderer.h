@@ -71,7 +71,7 @@ struct NoiseStats {
 
 struct DeviceShare {
     std::string name;
-    std::uint64_t paths = 0;
+    std::uint64_t paths = 0;  ///< traced, those of pilots too
     double busy_s = 0;
 };
 

@@ -262,6 +262,9 @@ TEST_CASE("Adaptive.DevicesAndBatchesDoNotMatter") {
     CHECK(r.stats.devices.size() >= 2);
     CHECK(same_bits(r.image, reference.image));
     CHECK(r.stats.noise->pilot_paths == reference.stats.noise->pilot_paths);
+    std::uint64_t paths = 0;
+    for (const DeviceShare& device : r.stats.devices) paths += device.paths;
+    CHECK(paths == r.stats.paths + r.stats.noise->pilot_paths);
 }
 
 TEST_CASE("Adaptive.TilesHoldTheFirstSamplesOfAUniformRender") {
