@@ -23,6 +23,14 @@ struct Point {
     double primitives, us_per_path;
 };
 
+/// Supports over a point, mean over the unit ball that holds the centres, as if none reached out of it.
+double overlap_of(const Scene& ball) {
+    double volume = 0;
+    for (const EllipsoidMedium& m : ball.media)
+        for (const Primitive& p : m.primitives) volume += std::pow(m.extent, 3) * std::abs(glm::determinant(p.axes));
+    return volume;
+}
+
 /// Measures one ball, prints its line; µs per path.
 Point measure(Session& session, const std::string& item, Scene scene) {
     if (!session.options().strategy.empty()) scene.render.strategy = session.options().strategy;
@@ -62,7 +70,7 @@ Point measure(Session& session, const std::string& item, Scene scene) {
 void bench_scaling_section(Session& session) {
     session.section("scaling",
                     "An item is a path through the film's pixels that see the ball. count_*: more primitives at constant overlap and optical\n"
-                    "depth; overlap_*: 16,384 primitives, overlap and size changed at constant optical depth. build: the accelerator,\n"
+                    "depth; overlap_*: 16,384 primitives, so many supports over a point at constant optical depth. build: the accelerator,\n"
                     "wall clock; cpu: processor seconds of the whole preparation.\n" +
                         fmt::format("{:12} {:>10} {:>9} {:>9} {:>9} {:>9} {:>10}", "", "primitives", "build s", "cpu s", "MB", "bytes/pr.", "us/path"));
     std::vector<Point> points;
@@ -73,9 +81,10 @@ void bench_scaling_section(Session& session) {
         session.note(fmt::format("cost of a path grows as primitives^{:.2f} from {:.0f} to {:.0f}", std::log(b.us_per_path / a.us_per_path) / std::log(b.primitives / a.primitives),
                                  a.primitives, b.primitives));
     }
-    for (const auto& [name, factor] : {std::pair{"overlap_1/8", 0.125}, {"overlap_1", 1.0}, {"overlap_8", 8.0}})
+    for (const auto& [name, overlap] : {std::pair{"overlap_1", 1.0}, {"overlap_4", 4.0}, {"overlap_16", 16.0}, {"overlap_64", 64.0}, {"overlap_256", 256.0}})
         if (session.wants(name)) {
             Scene scene = reference::ball_scene();
+            const double factor = overlap / overlap_of(scene);
             for (EllipsoidMedium& m : scene.media)
                 for (Primitive& p : m.primitives) {
                     p.axes *= std::cbrt(factor);

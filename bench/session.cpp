@@ -47,6 +47,7 @@ RenderOptions Session::render_options() const {
     if (!options_.device.empty()) o.devices = {options_.device};
     o.vector_width = options_.width;
     o.accelerator = options_.accelerator;
+    o.kept_cells = false;  // building them is what is measured
     return o;
 }
 

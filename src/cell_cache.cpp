@@ -92,9 +92,9 @@ std::filesystem::path cells_folder() {
     return cache.empty() ? cache : cache / "cells";
 }
 
-Cells cached_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const CellOptions& options, const std::filesystem::path& folder, double long_enough_s) {
+Cells cached_cells(std::span<const Ellipsoid> ellipsoids, const TreeSource& tree, const CellOptions& options, const std::filesystem::path& folder, double long_enough_s) {
     // Cells of so many are too large to be kept, and a file is in memory three times while it is read.
-    if (folder.empty() || ellipsoids.size() > kMostBytes / 64 || memory_in_use() + 3 * kMostBytes > memory_limit()) return build_cells(ellipsoids, tree, options);
+    if (folder.empty() || ellipsoids.size() > kMostBytes / 64 || memory_in_use() + 3 * kMostBytes > memory_limit()) return build_cells(ellipsoids, tree(), options);
     const std::string key = key_of(ellipsoids, options);
     if (const auto kept = load_binary(folder, key)) {
         try {
@@ -103,7 +103,7 @@ Cells cached_cells(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, c
         }
     }
     const auto start = std::chrono::steady_clock::now();
-    Cells cells = build_cells(ellipsoids, tree, options);
+    Cells cells = build_cells(ellipsoids, tree(), options);
     if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < long_enough_s) return cells;
     if (const Binary bytes = encode_cells(cells); bytes.size() <= kMostBytes) store_binary(folder, key, bytes);
     return cells;

@@ -109,6 +109,13 @@ void refuse_leftovers(const CLI::App& app, const CLI::App* top) {
     throw UsageError(where + "unknown flag '" + name + "'; the nearest is '" + nearest_flag(name, flag_names(app)) + "'");
 }
 
+/// A variable of the shell that isn't set makes an empty value: a mistake, not the default.
+void refuse_empty(const CLI::App& app) {
+    for (const CLI::Option* option : app.parse_order())
+        for (const std::string& value : option->results())
+            if (value.empty() && !option->get_positional()) throw UsageError(app.get_name() + ": " + option->get_name() + ": its value is empty");
+}
+
 /// The arguments as a shell would take them again.
 std::string command_line(int argc, const char* const* argv) {
     std::string line = "clume";
@@ -201,7 +208,7 @@ Command parse_command_line(int argc, const char* const* argv) {
     }
     render->add_option("--sample-range", texts.sample_range, "only samples A to B - 1 of each pixel")->type_name("A:B");
     render->add_option("--crop", texts.crop, "only this part of the film, half-open")->type_name("x0,y0,x1,y1");
-    render->add_option("--time-limit", texts.time_limit_s, "stop after this long and write what is done")->type_name("SECONDS");
+    render->add_option("--time-limit", texts.time_limit_s, "sample no longer than this and write what is done; building and compiling come on top")->type_name("SECONDS");
     render->add_option("--noise-threshold", texts.noise_threshold, "give each tile only the samples it needs for this standard error relative to its mean, such as 0.02; --spp at most")
         ->type_name("E");
     render->add_option("--kernel-timeout", texts.kernel_timeout_s, "a device silent for so long hangs and is given up; default 120; 0: never")->type_name("SECONDS");
@@ -302,7 +309,10 @@ Command parse_command_line(int argc, const char* const* argv) {
     }
     refuse_leftovers(app, nullptr);
     for (const CLI::App* sub : {render, compare, devices, info, bake, stress})
-        if (sub->parsed()) refuse_leftovers(*sub, &app);
+        if (sub->parsed()) {
+            refuse_leftovers(*sub, &app);
+            refuse_empty(*sub);
+        }
     if (app.get_subcommands().size() > 1) throw UsageError("one subcommand at a time");
 
     if (render->parsed()) {

@@ -26,27 +26,32 @@ device::uint kind_bit(LightKind kind) {
     return LIGHT_RECTANGLE;
 }
 
-/// Texels and alias table (Vose) of one environment; returns π × mean radiance, the irradiance it gives.
-double add_environment(const Light& light, DeviceScene& out, device::LightInfo& info, LightMasks& masks) {
+/// Texels and, if asked for, alias table (Vose) of one environment; returns π × mean radiance, the irradiance it gives.
+double add_environment(const Light& light, bool with_table, DeviceScene& out, device::LightInfo& info, LightMasks& masks) {
     const auto w = static_cast<std::size_t>(light.image.width), h = static_cast<std::size_t>(light.image.height), n = w * h;
     info.width = static_cast<device::uint>(w);
     info.height = static_cast<device::uint>(h);
     info.texel_offset = static_cast<device::uint>(out.texels.size());
-    std::vector<double> weight(n);
+    out.texels.reserve(out.texels.size() + n);
+    if (with_table) out.alias.reserve(out.alias.size() + n);
+    std::vector<double> weight(with_table ? n : 0);
     double total = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-        const std::size_t whole_rows = i / w;
-        const auto row = static_cast<double>(whole_rows);
+    for (std::size_t row = 0, i = 0; row < h; ++row) {
         // sin a − sin b = 2 cos((a + b)/2) sin((a − b)/2), which cancels nothing at the poles.
-        const double solid_angle = 4 * pi / static_cast<double>(w) * std::cos(pi * (0.5 - (row + 0.5) / static_cast<double>(h))) * std::sin(pi * 0.5 / static_cast<double>(h));
-        const glm::dvec3 rgb = glm::dvec3(light.image.rgb[3 * i], light.image.rgb[3 * i + 1], light.image.rgb[3 * i + 2]) * light.scale;
-        masks.grey = masks.grey && is_grey(rgb);
-        masks.brightest = std::max(masks.brightest, largest(rgb));
-        const device::float4& texel = out.texels.emplace_back(pack(rgb));
-        weight[i] = static_cast<double>(std::max({texel.x, texel.y, texel.z})) * solid_angle;  // of what the device has
-        total += weight[i];
-        out.alias.push_back({0xffffffffu, static_cast<device::uint>(i), static_cast<float>(solid_angle), 0});
+        const double solid_angle = 4 * pi / static_cast<double>(w) * std::cos(pi * (0.5 - (static_cast<double>(row) + 0.5) / static_cast<double>(h))) * std::sin(pi * 0.5 / static_cast<double>(h));
+        for (std::size_t column = 0; column < w; ++column, ++i) {
+            const glm::dvec3 rgb = glm::dvec3(light.image.rgb[3 * i], light.image.rgb[3 * i + 1], light.image.rgb[3 * i + 2]) * light.scale;
+            masks.grey = masks.grey && is_grey(rgb);
+            masks.brightest = std::max(masks.brightest, largest(rgb));
+            const device::float4& texel = out.texels.emplace_back(pack(rgb));
+            const double share = static_cast<double>(std::max({texel.x, texel.y, texel.z})) * solid_angle;  // of what the device has
+            total += share;
+            if (!with_table) continue;
+            weight[i] = share;
+            out.alias.push_back({0xffffffffu, static_cast<device::uint>(i), static_cast<float>(solid_angle), 0});
+        }
     }
+    if (!with_table) return total;
     device::AliasEntry* table = out.alias.data() + info.texel_offset;
     for (std::size_t i = 0; i < n; ++i) table[i].pdf_texel = total > 0 ? static_cast<float>(weight[i] / total / static_cast<double>(table[i].pdf_texel)) : 0.0f;
     if (!(total > 0)) return 0;
@@ -58,7 +63,7 @@ double add_environment(const Light& light, DeviceScene& out, device::LightInfo& 
 
 }  // namespace
 
-LightMasks add_lights(const Scene& scene, DeviceScene& out) {
+LightMasks add_lights(const Scene& scene, DeviceScene& out, bool with_tables) {
     LightMasks masks;
     const Normalization& n = out.normalization;
     const auto place = [&](const glm::dvec3& p) { return (p - n.center) * n.scale; };
@@ -72,7 +77,7 @@ LightMasks add_lights(const Scene& scene, DeviceScene& out) {
         switch (light.kind) {
             case LightKind::constant: irradiance = pi * largest(color); break;
             case LightKind::envmap:
-                irradiance = add_environment(light, out, info, masks);
+                irradiance = add_environment(light, with_tables, out, info, masks);
                 info.axis = pack({std::sin(light.rotate_y_rad), std::cos(light.rotate_y_rad), 0});
                 color = glm::dvec3(0);
                 break;
@@ -152,7 +157,7 @@ LightMasks add_lights(const Scene& scene, DeviceScene& out) {
 bool samples_lights(const Scene& scene) {
     DeviceScene scratch;
     scratch.normalization = normalize(scene);
-    return add_lights(scene, scratch).nee != 0;
+    return add_lights(scene, scratch, false).nee != 0;
 }
 
 }  // namespace clume

@@ -14,7 +14,8 @@ struct LightMasks {
     double brightest = 0;  ///< largest radiance or intensity a sample may meet, normalised units
 };
 
-LightMasks add_lights(const Scene& scene, DeviceScene& out);
+/// Without tables, environments have their texels alone: all that their alias tables follow from.
+LightMasks add_lights(const Scene& scene, DeviceScene& out, bool with_tables = true);
 
 /// Whether any light is sampled directly (next-event estimation): else no transmittance is ever estimated.
 bool samples_lights(const Scene& scene);

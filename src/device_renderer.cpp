@@ -72,6 +72,7 @@ std::size_t DeviceRenderer::rows_per_item(std::size_t rows, std::size_t samples)
 
 void DeviceRenderer::aim(FilmSums& film, std::uint64_t seed) {
     film_ = &film;
+    paths_ = 0;
     params_.seed_lo = static_cast<device::uint>(seed);
     params_.seed_hi = static_cast<device::uint>(seed >> 32);
     aimed_ = false;
@@ -160,7 +161,10 @@ void DeviceRenderer::run(const Batch& batch) {
 
 void DeviceRenderer::commit(const Batch& batch) {
     assert(film_ != nullptr);
-    for (const Piece& p : pieces_) film_->add(std::span(order_).subspan(p.first, p.count), p.splits, batch.end - batch.begin, p.sums);
+    for (const Piece& p : pieces_) {
+        film_->add(std::span(order_).subspan(p.first, p.count), p.splits, batch.end - batch.begin, p.sums);
+        paths_ += p.count * std::uint64_t{batch.end - batch.begin};
+    }
     pieces_.clear();
     for (std::size_t i = 0; i < found_.size(); ++i) raised_[i] = std::max(raised_[i], std::bit_cast<float>(found_[i]));
 }

@@ -41,6 +41,9 @@ public:
     void set_learned(std::span<const float> bounds, bool explore);
     std::span<const float> raised() const { return raised_; }
 
+    /// Paths of the batches that it has added to the film that it was last aimed at.
+    std::uint64_t paths() const { return paths_; }
+
     /// Work-items that fitted into the device's memory when a batch did not; 0 if all did.
     std::size_t short_of_memory() const { return short_of_memory_; }
 
@@ -86,6 +89,7 @@ private:
     std::size_t units_;                      ///< compute units
     std::size_t most_items_ = SIZE_MAX;      ///< work-items that fit its memory, as far as known
     std::size_t short_of_memory_ = 0;
+    std::uint64_t paths_ = 0;
 };
 
 /// Width of the vectors of primitives on a device: its own native width, unless told otherwise.

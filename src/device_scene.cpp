@@ -151,7 +151,7 @@ Structures structures_of(const DeviceScene& out, bool shadow_rays, bool lamps, c
 }
 
 /// Builds what is wanted; says what it is.
-std::string build_structures(const Structures& wanted, const BvhTree& tree, std::optional<int> majorant_grid, DeviceScene& out) {
+std::string build_structures(const Structures& wanted, const TreeSource& tree, std::optional<int> majorant_grid, bool kept_cells, DeviceScene& out) {
     std::string text;
     if (wanted.references || wanted.cell_groups) {
         const bool densities = wanted.scene_bound || out.strategy == "progressive";
@@ -166,15 +166,15 @@ std::string build_structures(const Structures& wanted, const BvhTree& tree, std:
             o.max_levels = 0;
             o.roots = majorant_grid;
         }
-        const Cells cells = cached_cells(out.ellipsoids, tree, o, cells_folder());
+        const Cells cells = cached_cells(out.ellipsoids, tree, o, kept_cells ? cells_folder() : std::filesystem::path());
         pack_cells(cells, wanted.cell_groups, wanted.references, out);
         text = fmt::format("{}x{}x{} cells, {} octree levels, {} leaves, {:.1f} references per primitive", cells.roots.x, cells.roots.y,
                            cells.roots.z, cells.levels, cells.leaves.size(), n ? static_cast<double>(cells.references) / static_cast<double>(n) : 0.0);
     }
-    if (wanted.scene_bound) out.params.scene_bound = std::nextafter(static_cast<float>(std::max(scene_bound(out.ellipsoids, tree), 1e-20)), 1e30f);
+    if (wanted.scene_bound) out.params.scene_bound = std::nextafter(static_cast<float>(std::max(scene_bound(out.ellipsoids, tree()), 1e-20)), 1e30f);
     if (out.strategy == "progressive") out.learned.assign(out.leaves.size(), mean_extinction(out.ellipsoids));
     if (wanted.bvh) {
-        out.bvh_stack = pack_bvh(tree, out);
+        out.bvh_stack = pack_bvh(tree(), out);
         text += fmt::format("{}8-wide bvh, {} nodes", text.empty() ? "" : "; ", out.nodes.size());
     }
     if (!out.group_medium.empty()) text += fmt::format(", {} groups", out.group_medium.size());
@@ -244,7 +244,7 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     DeviceScene out;
     out.normalization = normalize(scene);
     const MediaTraits traits = pack_media(scene, out);
-    const LightMasks lights = add_lights(scene, out);
+    const LightMasks lights = add_lights(scene, out, with_structures);
     const RenderSettings& r = scene.render;
 
     out.strategy = r.strategy != "auto" ? r.strategy : "delta";
@@ -255,11 +255,12 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     for (const auto& m : scene.media) primitives += m.primitives.size();
     require_memory(scene.path, {{"primitives for the device", primitives * (sizeof(Ellipsoid) + sizeof(device::Primitive))}, {"tree over them", primitives * 2 * sizeof(BvhTree::Node)}});
     out.ellipsoids = make_ellipsoids(scene, out.normalization);
-    const BvhTree tree = with_structures ? build_bvh(out.ellipsoids) : BvhTree{};
-    const std::size_t lamps = with_structures && (lights.nee & (LIGHT_POINT | LIGHT_SPOT)) ? mark_lamps(scene, tree, out) : 0;
+    std::optional<BvhTree> built;
+    const auto tree = [&]() -> const BvhTree& { return built ? *built : built.emplace(build_bvh(out.ellipsoids)); };
+    const std::size_t lamps = with_structures && (lights.nee & (LIGHT_POINT | LIGHT_SPOT)) ? mark_lamps(scene, tree(), out) : 0;
     const Structures wanted = with_structures ? structures_of(out, lights.nee != 0, lamps > 0, options) : Structures{};
     std::string accelerator;
-    if (with_structures) accelerator = build_structures(wanted, tree, r.majorant_grid, out);
+    if (with_structures) accelerator = build_structures(wanted, tree, r.majorant_grid, options.kept_cells, out);
     else pack_primitives(out);
     const GridTraits voxels = pack_grids(scene, out);
     Box bounds = bounds_of(out.ellipsoids);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -144,9 +145,12 @@ int render_scene(const RenderCommand& command) {
                                      crop->x1, crop->y1, scene.film.width, scene.film.height));
     if (stop_requested()) return interrupted_early();
     const std::vector<DeviceInfo> known = list_devices();
+    const auto pilot_start = std::chrono::steady_clock::now();
     const std::optional<Pilot> pilot = run_pilot(scene, command.options, pilot_folder(), stop_requested());
+    const double pilot_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - pilot_start).count();
     if (stop_requested()) return interrupted_early();
     if (pilot) scene = with_pair(std::move(scene), pilot->rows[pilot->chosen].pair);
+    else if (scene.render.strategy == "auto" && pilot_s >= command.options.time_limit_s.value_or(pilot_s + 1)) say("measuring strategies took as long as the time limit: going on with delta");
     if (command.explain) print_explanation(scene, command.options, pilot);
 
     ProgressReporter progress(command.quiet, command.options.time_limit_s);

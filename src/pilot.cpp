@@ -2,6 +2,7 @@
 #include "src/pilot.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <fmt/format.h>
@@ -29,8 +30,21 @@ std::size_t primitive_count(const Scene& scene) {
     return count;
 }
 
+/// When a pilot ends early: it is asked to, or it has taken as long as the whole render may.
+struct Until {
+    const std::atomic<bool>& stop;
+    std::optional<double> limit_s;
+    std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+
+    std::optional<double> left_s() const {
+        if (!limit_s) return limit_s;
+        return std::max(0.0, *limit_s - std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    }
+    bool over() const { return stop.load() || left_s() == 0.0; }
+};
+
 /// `pixels` becomes the number rendered.
-PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const std::atomic<bool>& stop, std::uint32_t& pixels) {
+PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const Until& until, std::uint32_t& pixels) {
     PilotRow row{pair, 0, 0, {}};
     try {
         RenderOptions o = options;
@@ -41,8 +55,8 @@ PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodP
         Renderer renderer(with_pair(scene, pair), o);
         Accumulation film = renderer.start(scene.render.seed, kFirstSample);
         pixels = renderer.rendered_pixels();
-        renderer.extend(film, kFirstSample + kSamples, {{}, &stop, {}});
-        if (pixels == 0 || stop.load()) return row;
+        renderer.extend(film, kFirstSample + kSamples, {{}, &until.stop, until.left_s()});
+        if (pixels == 0 || until.over()) return row;
         const RenderResult r = renderer.result(film);
         for (std::size_t k = 0; k < WORK_KINDS; ++k) row.work_ns += work_weights_ns[k] * static_cast<double>(r.stats.work[k]);
         for (const float v : r.image.variance) row.variance += static_cast<double>(v);
@@ -63,7 +77,7 @@ std::size_t best_of(const std::vector<PilotRow>& rows) {
 }
 
 /// No rows if there is nothing to measure.
-Pilot measure_all(const Scene& scene, const RenderOptions& options, const std::atomic<bool>& stop) {
+Pilot measure_all(const Scene& scene, const RenderOptions& options, const Until& until) {
     Pilot pilot;
     pilot.spp = kSamples;
     const std::string estimator = scene.render.transmittance == "auto" ? "analytic" : scene.render.transmittance;
@@ -82,8 +96,8 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const std::a
     }
     // Distances drawn by unbiased strategies have one distribution: what tells them apart is work, whatever the estimator.
     for (const MethodPair& pair : candidates) {
-        pilot.rows.push_back(measure(scene, options, pair, stop, pilot.pixels));
-        if (stop.load() || (pilot.rows.back().error.empty() && pilot.pixels == 0)) return {};
+        pilot.rows.push_back(measure(scene, options, pair, until, pilot.pixels));
+        if (until.over() || (pilot.rows.back().error.empty() && pilot.pixels == 0)) return {};
     }
     double variance = 0, measured = 0;
     for (const PilotRow& row : pilot.rows)
@@ -94,9 +108,11 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const std::a
     pilot.chosen = best_of(pilot.rows);
     if (scene.render.transmittance != "auto" || !samples_lights(scene)) return pilot;
     const MethodPair winner = pilot.rows[pilot.chosen].pair;
-    for (const Method& e : estimators())
-        if (e.kind == BiasKind::unbiased && e.name != estimator) pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, stop, pilot.pixels));
-    if (stop.load()) return {};
+    for (const Method& e : estimators()) {
+        if (e.kind != BiasKind::unbiased || e.name == estimator) continue;
+        pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, until, pilot.pixels));
+        if (until.over()) return {};
+    }
     const std::size_t best = best_of(pilot.rows);
     if (pilot_margin * pilot.rows[best].inverse_efficiency() < pilot.rows[pilot.chosen].inverse_efficiency()) pilot.chosen = best;
     return pilot;
@@ -159,7 +175,7 @@ std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options,
     if (!folder.empty())
         if (const auto bytes = load_binary(folder, key))
             if (auto pilot = from_text(std::string(bytes->begin(), bytes->end()))) return pilot;
-    Pilot pilot = measure_all(scene, one, stop);
+    Pilot pilot = measure_all(scene, one, {stop, options.time_limit_s});
     if (pilot.rows.empty()) return std::nullopt;
     const bool complete = std::all_of(pilot.rows.begin(), pilot.rows.end(), [](const PilotRow& r) { return r.error.empty(); });
     if (!folder.empty() && complete) {

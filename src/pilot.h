@@ -40,8 +40,8 @@ struct Pilot {
 };
 
 /// The pilot for a scene whose strategy is `auto`; nothing if it is pinned, or if there is nothing to choose (no media, no
-/// pixel that meets them), or if `stop` became true. A result is kept in `folder` (unless that is empty), keyed by all that it
-/// depends on. Throws what Renderer throws.
+/// pixel that meets them), or if `stop` became true or it took as long as the options' time limit. A result is kept in `folder`
+/// (unless that is empty), keyed by all that it depends on. Throws what Renderer throws.
 std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options, const std::filesystem::path& folder, const std::atomic<bool>& stop);
 
 /// Beside the programs' cache; empty if there is none.

@@ -24,6 +24,8 @@ constexpr std::uint32_t first_noise_pilot_sample = 0xa0000000u;
 constexpr std::uint32_t least_samples = 16;
 /// Image to pilot: where that much more is needed the pilot is doubled.
 constexpr double pilot_share = 16;
+/// A tile's pilot has at least so many, as one of 16 x 16 pixels has by 8 of each: few pixels alone would tell too little.
+constexpr std::uint64_t least_pilot_paths = 2048;
 
 double seconds_since(Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); }
 
@@ -86,10 +88,11 @@ void Renderer::Impl::run_pass(Accumulation::State& a, FilmSums& sums, PassWork w
     setup.warnings.insert(setup.warnings.end(), report.warnings.begin(), report.warnings.end());
     for (std::size_t k = report.workers.size(); k-- > 0;) {
         const WorkerReport& w = report.workers[k];
-        const auto share = std::find_if(a.devices.begin(), a.devices.end(), [&](const DeviceShare& d) { return d.name == w.name; });
-        if (share != a.devices.end()) share->busy_s += w.busy_s;
-        else a.devices.insert(a.devices.begin(), DeviceShare{w.name, 0, w.busy_s});
         const auto& renderer = static_cast<const DeviceRenderer&>(*workers[k]);
+        auto share = std::find_if(a.devices.begin(), a.devices.end(), [&](const DeviceShare& d) { return d.name == w.name; });
+        if (share == a.devices.end()) share = a.devices.insert(a.devices.begin(), DeviceShare{w.name, 0, 0});
+        share->paths += renderer.paths();
+        share->busy_s += w.busy_s;
         if (const std::size_t items = renderer.short_of_memory(); items > 0 && told_short_of_memory.insert(w.name).second)
             setup.warnings.push_back(fmt::format("device {} is short of memory: batches of at most {} paths at a time", w.name, items));
         for (std::size_t i = 0; i < a.raised.size(); ++i) a.raised[i] = std::max(a.raised[i], renderer.raised()[i]);
@@ -157,8 +160,10 @@ void Renderer::Impl::choose_counts(Accumulation::State& a, std::uint32_t most, P
         std::vector<std::uint32_t> held(noise.size(), 0);
         for (std::uint32_t begin = 0, end = least_samples / 2; begin < end; begin = end, end *= 2) {
             std::vector<std::uint32_t> ends(noise.size(), 0);
-            for (std::size_t t = 0; t < noise.size(); ++t)
-                if (held[t] == begin && std::min<double>(needed[t], most) > pilot_share * begin) ends[t] = first_noise_pilot_sample + (held[t] = end);
+            for (std::size_t t = 0; t < noise.size(); ++t) {
+                const bool too_few = begin < most && std::uint64_t{begin} * noise[t].count < least_pilot_paths;
+                if (held[t] == begin && (too_few || std::min<double>(needed[t], most) > pilot_share * begin)) ends[t] = first_noise_pilot_sample + (held[t] = end);
+            }
             PassWork chosen = work(ends, first_noise_pilot_sample + begin, UINT32_MAX);
             if (chosen.tiles.empty()) break;
             run_pass(a, pilot, std::move(chosen), first_noise_pilot_sample + begin, control);

@@ -262,6 +262,9 @@ TEST_CASE("Adaptive.DevicesAndBatchesDoNotMatter") {
     CHECK(r.stats.devices.size() >= 2);
     CHECK(same_bits(r.image, reference.image));
     CHECK(r.stats.noise->pilot_paths == reference.stats.noise->pilot_paths);
+    std::uint64_t paths = 0;
+    for (const DeviceShare& device : r.stats.devices) paths += device.paths;
+    CHECK(paths == r.stats.paths + r.stats.noise->pilot_paths);
 }
 
 TEST_CASE("Adaptive.TilesHoldTheFirstSamplesOfAUniformRender") {
@@ -306,6 +309,21 @@ TEST_CASE("Adaptive.DarkAndEmptyScenesEnd", "[quick]") {
     CHECK(empty.stats.noise->tiles == 0);
     CHECK(empty.image.rgb[0] == 1);
     CHECK(empty.stats.noise->above == 0);
+}
+
+TEST_CASE("Adaptive.FewPixelsGetAPilotOfAsManyPaths", "[quick]") {
+    // Two pixels that see the whole scene: 8 samples of each would often find nothing, and an image of nothing be within the threshold.
+    Scene scene = uneven();
+    scene.camera.fov_rad = 2.5;
+    scene.film = {2, 1};
+    for (std::uint64_t seed = 0; seed < 8; ++seed) {
+        scene.render.seed = seed;
+        const RenderResult r = render_now(scene, within(0.1));
+        INFO("seed " << seed << ": " << r.stats.noise->summary());
+        CHECK(r.stats.noise->pilot_paths >= 2048);
+        CHECK(r.stats.samples_min > 16);
+        CHECK(r.stats.noise->worst < 0.15);
+    }
 }
 
 TEST_CASE("Adaptive.CropsAndProgressiveWorkToo") {

@@ -3,6 +3,8 @@
 // majorant hold everywhere in the cell, empty cells know their distance, and threads change nothing.
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <fmt/format.h>
 #include <sched.h>
 
@@ -298,12 +300,18 @@ TEST_CASE("Cells.AreKept", "[quick]") {
     CHECK(encode_cells(decode_cells(built)) == built);
 
     const clume::test::TempFolder folder;
-    const auto ask = [&](const CellOptions& o, double long_enough_s = 0) { return encode_cells(cached_cells(scene.ellipsoids, tree, o, folder.path(), long_enough_s)); };
+    int trees = 0;
+    const TreeSource count_tree = [&]() -> const BvhTree& { return ++trees, tree; };
+    const auto ask = [&](const CellOptions& o, double long_enough_s = 0) { return encode_cells(cached_cells(scene.ellipsoids, count_tree, o, folder.path(), long_enough_s)); };
     const auto files = [&] { return std::distance(std::filesystem::directory_iterator(folder.path()), std::filesystem::directory_iterator()); };
     CHECK(ask(options, 1e9) == built);
     CHECK(files() == 0);
     CHECK(ask(options) == built);
     REQUIRE(files() == 1);
+    // A second start builds no tree.
+    const int first_start = trees;
+    CHECK(ask(options) == built);
+    CHECK(trees == first_start);
     // What lies there is what is given, if it can be.
     const std::string key = std::filesystem::directory_iterator(folder.path())->path().stem().string();
     REQUIRE(store_binary(folder.path(), key, other));
@@ -317,7 +325,23 @@ TEST_CASE("Cells.AreKept", "[quick]") {
     // A scene that differs in one bit is another.
     std::vector<Ellipsoid> moved = scene.ellipsoids;
     moved[3].center.x = std::nextafter(moved[3].center.x, 9.0);
-    (void)cached_cells(moved, tree, options, folder.path(), 0);
+    (void)cached_cells(moved, count_tree, options, folder.path(), 0);
     CHECK(files() == 3);
-    CHECK(encode_cells(cached_cells(scene.ellipsoids, tree, options, {}, 0)) == built);
+    CHECK(encode_cells(cached_cells(scene.ellipsoids, count_tree, options, {}, 0)) == built);
+}
+
+TEST_CASE("Cells.AreBuiltWhereBuildingIsMeasured", "[quick]") {
+    // As benchmarks ask for it: neither kept nor taken from what was.
+    const clume::test::TempFolder cache;
+    const char* before = std::getenv("XDG_CACHE_HOME");
+    const std::string old = before ? before : "";
+    setenv("XDG_CACHE_HOME", cache.path().c_str(), 1);
+    RenderOptions options;
+    options.kept_cells = false;
+    const Scene scene = reference::ball_scene_n(20000);  // more than 50 ms
+    const DeviceScene built = make_device_scene(scene, options);
+    CHECK_FALSE(std::filesystem::exists(cells_folder()));
+    CHECK(make_device_scene(scene, {}).hash() == built.hash());
+    if (before) setenv("XDG_CACHE_HOME", old.c_str(), 1);
+    else unsetenv("XDG_CACHE_HOME");
 }

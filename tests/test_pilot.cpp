@@ -3,6 +3,7 @@
 // strategy is pinned or nothing is to be seen; and what the command line says of it.
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <filesystem>
 
 #include "src/pilot.h"
 #include "tests/cli_process.h"
@@ -101,6 +102,11 @@ TEST_CASE("Pilot.NotWhereNothingIsToChoose", "[quick]") {
     CHECK_FALSE(run_pilot(scene, {}, folder.path(), go_on));
     const std::atomic<bool> stop{true};
     CHECK_FALSE(run_pilot(lit_mixture(5, 3), {}, folder.path(), stop));
+    // Nor as long as all of the render may take: and what was cut short is not kept.
+    RenderOptions hurried;
+    hurried.time_limit_s = 1e-3;
+    CHECK_FALSE(run_pilot(lit_mixture(5, 3), hurried, folder.path(), go_on));
+    CHECK(std::filesystem::is_empty(folder.path()));
 }
 
 TEST_CASE("Pilot.IsToldByExplainAndTheImage") {
