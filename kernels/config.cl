@@ -94,12 +94,13 @@
 #ifndef CLUME_BVH_STACK  // entries; the host gives the deepest that this tree can need
 #define CLUME_BVH_STACK 256
 #endif
-#ifndef CLUME_LAUNCH_EVENTS  // flights a work-item does before it saves its state for the next launch
+#ifndef CLUME_LAUNCH_EVENTS  // flights a work-item does before it saves its state for the next launch; 16 tentative collisions count as one more
 #define CLUME_LAUNCH_EVENTS 4096
 #endif
-#ifndef CLUME_FLIGHT_DRAWS  // tentative collisions a null-collision flight does before it pauses
-#define CLUME_FLIGHT_DRAWS 65536
+#ifndef CLUME_FLIGHT_DRAWS  // tentative collisions a null-collision flight does before it pauses: a power of two
+#define CLUME_FLIGHT_DRAWS 4096
 #endif
+#define TENTATIVE_EVENTS(n) ((n) >> 4)
 
 #define CLUME_PARTS (CLUME_GROUP_SIZE / CLUME_WIDTH)
 #define CLUME_PER_PRIMITIVE (!CLUME_UNIFORM_G || !CLUME_UNIFORM_ALBEDO || CLUME_EMISSION == 2 || \

@@ -13,10 +13,8 @@ typedef struct {
 /// Whitens o − mu and d, and finds the chord inside whitened radius sqrt(e2); mask of lanes hit by the full line.
 /// The points o + t d at entry and exit lie on the surface, ends error < 2 ulp of the radius; a hit is lost or invented by lines that
 /// are no farther than that from tangency. d needs not be normalised.
-static vint intersect(__global const float* part, float3 o, float3 d, float e2, Chord* c) {
-    const vfloat x = o.x - vload_row(part), y = o.y - vload_row(part + 16), z = o.z - vload_row(part + 32);
-    const vfloat w00 = vload_row(part + 48), w01 = vload_row(part + 64), w02 = vload_row(part + 80);
-    const vfloat w11 = vload_row(part + 96), w12 = vload_row(part + 112), w22 = vload_row(part + 128);
+static vint intersect_rows(vfloat mu_x, vfloat mu_y, vfloat mu_z, vfloat w00, vfloat w01, vfloat w02, vfloat w11, vfloat w12, vfloat w22, float3 o, float3 d, float e2, Chord* c) {
+    const vfloat x = o.x - mu_x, y = o.y - mu_y, z = o.z - mu_z;
     const vfloat a0 = fma(w00, x, fma(w01, y, w02 * z)), a1 = fma(w11, y, w12 * z), a2 = w22 * z;
     const vfloat b0 = fma(w00, (vfloat)d.x, fma(w01, (vfloat)d.y, w02 * d.z)), b1 = fma(w11, (vfloat)d.y, w12 * d.z), b2 = w22 * d.z;
     const vfloat bb = fma(b0, b0, fma(b1, b1, b2 * b2));
@@ -31,6 +29,11 @@ static vint intersect(__global const float* part, float3 o, float3 d, float e2, 
     c->t_in = fma(-c->h, c->inverse_w, c->t_perp);
     c->t_out = fma(c->h, c->inverse_w, c->t_perp);
     return hit;
+}
+
+static vint intersect(__global const float* part, float3 o, float3 d, float e2, Chord* c) {
+    return intersect_rows(vload_row(part), vload_row(part + 16), vload_row(part + 32), vload_row(part + 48), vload_row(part + 64), vload_row(part + 80), vload_row(part + 96),
+                          vload_row(part + 112), vload_row(part + 128), o, d, e2, c);
 }
 
 /// The same by the quadratic in S = Σ⁻¹ (rows: centre, then S xx xy xz yy yz zz), kept to be measured: the discriminant is taken

@@ -3,6 +3,7 @@
 // CLUME_INFINITY. `regular`: cell by cell, exact depths, inverted in the last. `march`: fixed steps from the ray's origin.
 // `delta`: null collisions under the bounds of the bricks, of a table of the grid's own, or one for all of it.
 // `progressive`: the same under bounds of the bricks that are learned.
+#include "cell_rest.cl"
 #include "grid_bounds.cl"
 #include "strategy_progressive.cl"
 #if CLUME_GRIDS
@@ -39,6 +40,8 @@ static float grid_invert(uint g, float3 o, float3 d, float t_end, float tau, Wor
     } while (grid_next(&w, grid, grid_cells));
     return CLUME_INFINITY;
 }
+
+#define GRID_REST 0x80000u  // number of the draw for the rest of a flight that null collisions give up
 
 /// `regular`.
 static float grid_flight_regular(uint g, float3 o, float3 d, float t_end, uint range, const Draws* r, Work* work, SCENE_ARGS) {
@@ -119,8 +122,15 @@ static float grid_flight_delta(uint g, float3 o, float3 d, float t_end, uint ran
             COUNT(&f->work, WORK_DENSITIES, 1);
             // Two tentative collisions a block of random numbers.
             const uint accept = draw & 1u ? bits.y : bits.w;
+            f->tentative += 1;
             if (uniform_s(accept) * majorant < sigma) return t;
             draw += 1;
+#if CLUME_STRATEGY != STRATEGY_PROGRESSIVE
+            if (draw == CLUME_PATIENCE) {  // as in cell_rest.cl: the rest of the flight, exactly
+                t += grid_flight_regular(g, along_s(o, d, t), d, t_end - t, range + GRID_REST, r, &f->work, SCENE);
+                return t < CLUME_INFINITY ? t : CLUME_INFINITY;
+            }
+#endif
             if (draw & 1u) {
                 tau = exponential_s(bits.z);
             } else {

@@ -95,10 +95,16 @@ static float grid_ratio(const bool residual, uint g, float3 o, float3 d, float t
             const float sigma = bounds_look_up(bounds_value(&w, grid, t, grid_cells, grid_values), majorant, f);
             COUNT(&f->work, WORK_VOXELS, 1);
             COUNT(&f->work, WORK_DENSITIES, 1);
+            f->tentative += 1;
             // Rounding must not take a value below the brick's least one, nor the share above 1.
             weight *= max_s(fma(-max_s(sigma - control, 0.0f), inverse, 1.0f), 0.0f);
             if (!weight_roulette(&weight, draw & 1u ? bits.y : bits.w)) return 0.0f;
             draw += 1;
+            if (draw == CLUME_PATIENCE) {  // as in cell_rest.cl: the rest of the ray as it is
+                known = fma(-control, end - t, known);
+                weight *= depth_transmittance(grid_depth(g, along_s(o, d, t), d, t_end - t, (ulong)128 << 40, &f->work, SCENE));
+                return residual ? weight * exp_s(-known) : weight;
+            }
             if (draw & 1u) {
                 tau = exponential_s(bits.z);
             } else {

@@ -6,6 +6,7 @@
 #if CLUME_LANES
 
 #define LANE_SET(to, value, mask) to = vselect(to, value, mask)
+#define LANE_OF(type, v, i) (((const type*)&(v))[i])
 
 // Elements of two vectors by their places, those of q counted on from those of p. Compilers know what to make of the built-in
 // one; shuffle2 is a function to some, and vectors put together element by element are taken apart by all.
@@ -61,6 +62,9 @@ typedef struct {
     vuint slot, threshold, accept;                        // its random words
     vuint draw, primitive;
 } LaneFlights;
+
+static float3 lane_origin(const LaneFlights* f, int i) { return (float3)(LANE_OF(float, f->ox, i), LANE_OF(float, f->oy, i), LANE_OF(float, f->oz, i)); }
+static float3 lane_direction(const LaneFlights* f, int i) { return (float3)(LANE_OF(float, f->dx, i), LANE_OF(float, f->dy, i), LANE_OF(float, f->dz, i)); }
 
 static vint lanes_position(vfloat q, vfloat low, vfloat size, float count) {
     const vfloat last = min_v(low + size, (vfloat)count) - CELL_UNIT(CLUME_CELL_LEVELS);

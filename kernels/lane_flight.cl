@@ -2,7 +2,7 @@
 // `delta` under the cells' bounds for CLUME_WIDTH flights side by side: null_collisions of strategy_delta.cl, lane by lane, with
 // the same results to the bit. In every round each flight has its tentative collision, or steps to its next cell.
 #include "lane_cells.cl"
-#include "rng.cl"
+#include "cell_rest.cl"
 
 #if CLUME_LANES
 
@@ -73,6 +73,23 @@ static vint lanes_begin(LaneFlights* f, vfloat t_end, const LaneDraws* r, vint m
     return under_way;
 }
 
+/// Leaves the rest of their cells, up to `end`, to cell_decompose; returns the lanes that collide there.
+static vint lanes_rest(LaneFlights* f, const LaneDraws* r, vfloat end, vint stuck, vint* result, __global const Reference* references, __global const Primitive* primitives) {
+    vint collided = (vint)0;
+    for (int i = 0; i < CLUME_WIDTH; ++i) {
+        if (!LANE_OF(int, stuck, i)) continue;
+        const Draws own = {LANE_OF(uint, r->sample, i), LANE_OF(uint, r->pixel, i), LANE_OF(uint, r->depth, i), r->seed};
+        const float last = LANE_OF(float, end, i);
+        const float t = cell_decompose(LANE_OF(uint, f->reference, i), LANE_OF(uint, f->count, i), lane_origin(f, i), lane_direction(f, i), LANE_OF(float, f->t, i), last,
+                                       draw_key(&own, LANE_OF(uint, f->draw, i) ^ DRAW_REST), (uint*)&f->primitive + i, references, primitives);
+        ((float*)&f->t)[i] = min_s(t, last);
+        if (!(t < CLUME_INFINITY)) continue;
+        ((int*)result)[i] = FLIGHT_COLLIDED;
+        ((int*)&collided)[i] = -1;
+    }
+    return collided;
+}
+
 /// Flies the lanes in *under_way until no more than `enough` are; those that end are taken out of it, and set *result.
 /// *above: −1 per lane for each look-up above its bound.
 static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint* result, int enough, vint* above, SCENE_ARGS) {
@@ -104,10 +121,12 @@ static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint*
             LANE_SET(f->draw, f->draw + 1u, tentative);
             const vint real = tentative & (uniform_v(f->accept) < probability);
             const vint pause = tentative & ~real & ((f->draw % (vuint)CLUME_FLIGHT_DRAWS) == (vuint)0u);
+            const vint stuck = tentative & ~real & ~pause & ((f->draw % (vuint)CLUME_PATIENCE) == (vuint)0u);
             LANE_SET(f->primitive, primitive, real);
             LANE_SET(*result, (vint)FLIGHT_COLLIDED, real);
             LANE_SET(*result, (vint)FLIGHT_PAUSED, pause);
             *under_way &= ~(real | pause);
+            if (vany(stuck)) *under_way &= ~lanes_rest(f, r, end, stuck, result, references, primitives);
             lanes_draw(f, r, tentative);
         }
         if (lanes_count(*under_way) <= enough) return;

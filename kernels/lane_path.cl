@@ -27,10 +27,10 @@ typedef struct {
 #endif
     vint above;               // −1 per lane for each look-up above its bound by lanes_fly
     uint violations;          // such look-ups by others
+    uint tentative;           // tentative collisions of shadow rays
     ulong excess;
 } Lanes;
 
-#define LANE_OF(type, v, i) (((const type*)&(v))[i])
 #if CLUME_CHANNELS == 1
 #define LANE_SPECTRUM(v, i) (((const float*)&(v)[0])[i])
 #define LANE_CHANNEL(s, c) (s)
@@ -40,9 +40,6 @@ typedef struct {
 #define LANE_CHANNEL(s, c) (((const float*)&(s))[c])
 #define PARAM_CHANNEL(p, c) ((c) == 0 ? (p).x : (c) == 1 ? (p).y : (p).z)
 #endif
-
-static float3 lane_origin(const LaneFlights* f, int i) { return (float3)(LANE_OF(float, f->ox, i), LANE_OF(float, f->oy, i), LANE_OF(float, f->oz, i)); }
-static float3 lane_direction(const LaneFlights* f, int i) { return (float3)(LANE_OF(float, f->dx, i), LANE_OF(float, f->dy, i), LANE_OF(float, f->dz, i)); }
 
 static void lane_add(vfloat* radiance, int i, spectrum s) {
     for (int c = 0; c < CLUME_CHANNELS; ++c) ((float*)(radiance + c))[i] += LANE_CHANNEL(s, c);
@@ -230,10 +227,12 @@ static void lanes_collide(Lanes* l, vint mask, SCENE_ARGS) {
 #else
         Flight flight;
         flight.violations = l->violations;
+        flight.tentative = 0;
         flight.excess = l->excess;
         value *= transmittance_estimate(lane_origin(f, i), s.direction, s.distance, word, &r, &flight, SCENE);
         lane_add(l->radiance, i, LANE_SPECTRUM(l->beta, i) * value);
         l->violations = flight.violations;
+        l->tentative += flight.tentative;
         l->excess = flight.excess;
 #endif
     }

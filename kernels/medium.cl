@@ -62,10 +62,11 @@ static void work_clear(Work* work) {
 }
 
 /// A flight under way or ended: t reached, draws used, the primitive it collided with (if CLUME_PER_PRIMITIVE), how often
-/// the density exceeded its bound, and the sum of the shares of density lost by that (20 fraction bits).
+/// the density exceeded its bound, and the sum of the shares of density lost by that (20 fraction bits). `tentative`: tentative
+/// collisions, of the path's other flights and estimates too, since it was 0.
 typedef struct {
     float t;
-    uint draw, primitive, violations;
+    uint draw, primitive, violations, tentative;
     ulong excess;
     Work work;
 } Flight;
@@ -75,6 +76,7 @@ static void flight_clear(Flight* f) {
     f->draw = 0;
     f->primitive = CLUME_NO_PRIMITIVE;
     f->violations = 0;
+    f->tentative = 0;
     f->excess = 0;
     work_clear(&f->work);
 }

@@ -47,8 +47,10 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
             if (p.sample >= sample_end) break;
             path_begin(&p, pixel, p.sample, params);
         }
-        if (events++ == CLUME_LAUNCH_EVENTS) break;
+        if (events >= CLUME_LAUNCH_EVENTS) break;
+        p.flight.tentative = 0;
         path_event(&p, pixel, SCENE);
+        events += 1 + TENTATIVE_EVENTS(p.flight.tentative);
         if (!(p.flags & PATH_ALIVE)) {
             film_sample(sum, p.radiance, params->film_scale);
             sum[FILM_ALPHA] += (p.flags & PATH_ALPHA) ? 1 : 0;
@@ -236,7 +238,8 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
         if (busy > 0) lanes_fly(&l.flight, &l.draws, &l.under_way, &l.result, tired ? 0 : busy * CLUME_LANES_ENOUGH / 16, &l.above, SCENE);
         vint ended = out & ~l.under_way;
         out = l.under_way;
-        events += lanes_count(ended);
+        const vuint tentative = vselect(l.flight.draw % (vuint)CLUME_FLIGHT_DRAWS, (vuint)CLUME_FLIGHT_DRAWS, l.result == (vint)FLIGHT_PAUSED);
+        events += lanes_count(ended & -(1 + as_vint(TENTATIVE_EVENTS(tentative))));
 #if LANE_SHADOWS
         const vint shadow = ended & l.shadow;
         if (vany(shadow)) lanes_lit(&l, shadow & (l.result != (vint)FLIGHT_PAUSED));
@@ -246,6 +249,8 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
         const vint escaped = ended & (l.result == (vint)FLIGHT_ESCAPED), collided = ended & (l.result == (vint)FLIGHT_COLLIDED);
         if (vany(escaped)) lanes_escape(&l, escaped, SCENE);
         if (vany(collided)) lanes_collide(&l, collided, SCENE);
+        events += (int)TENTATIVE_EVENTS(l.tentative);
+        l.tentative = 0;
         waiting |= ended & l.alive;
         const vint over = ended & ~l.alive;
         if (!vany(over)) continue;

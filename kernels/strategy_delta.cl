@@ -6,7 +6,7 @@
 // and the primitive collided with comes for free. The residual optical depth is carried from cell to cell.
 // Under one bound for the scene (CLUME_SCENE_BOUND): the density of all primitives is looked up at each tentative collision.
 // A density above its bound is counted: the host reports it.
-#include "medium.cl"
+#include "cell_rest.cl"
 
 #define NULL_FLIGHT 0          // ends at the first real collision
 #define NULL_RATIO 1           // multiplies *weight by the chances of not colliding
@@ -91,6 +91,7 @@ static int null_collisions(const int mode, float3 o, float3 d, float t_end, Flig
             COUNT(&f->work, WORK_PRIMITIVES, 1);
             COUNT(&f->work, WORK_DRAWS, 1);
             draw += 1;
+            f->tentative += 1;
             if (mode == NULL_FLIGHT) {
                 if (uniform_s(accept_bits) < probability) {
                     f->primitive = primitive;
@@ -105,6 +106,18 @@ static int null_collisions(const int mode, float3 o, float3 d, float t_end, Flig
             } else {
                 *weight *= max_s(1.0f - probability, 0.0f) * gain;
                 if (!weight_roulette(weight, accept_bits)) return FLIGHT_COLLIDED;
+            }
+            if (draw % CLUME_PATIENCE == 0) {
+                COUNT(&f->work, WORK_PRIMITIVES, w.entry.count);
+                if (mode == NULL_FLIGHT) {
+                    f->t = cell_decompose(w.entry.reference, w.entry.count, o, d, t, end, draw_key(r, draw ^ DRAW_REST), &f->primitive, references, primitives);
+                    if (f->t < CLUME_INFINITY) return FLIGHT_COLLIDED;
+                } else {
+                    // Of a control, all that the cell has is known already.
+                    const float known = mode == NULL_RESIDUAL_RATIO ? (w.entry.majorant - rate) * (end - t) : 0.0f;
+                    *weight *= exp_s(-clamp_s(cell_depth(w.entry.reference, w.entry.count, o, d, t, end, references, primitives) - known, 0.0f, 80.0f));
+                }
+                t = end;
             }
             const uint4 bits = draw_bits(r, draw);
             slot_bits = bits.y;
@@ -152,6 +165,7 @@ static int null_collisions_scene(const int mode, float3 o, float3 d, float t_end
         CellEntry cell;
         const float sigma = point_density(p, &cell, &f->work, SCENE), probability = sigma * inverse_bound;
         f->violations += sigma > bound ? 1u : 0u;
+        f->tentative += 1;
         if (mode == NULL_FLIGHT) {
             if (uniform_s(bits.y) < probability) {
 #if CLUME_PER_PRIMITIVE

@@ -54,6 +54,7 @@ static int flight_progressive(float3 o, float3 d, float t_end, Flight* f, const 
             COUNT(&f->work, WORK_DRAWS, 1);
             const float sigma = progressive_clamp(density, bound, raised + index, f);
             draw += 1;
+            f->tentative += 1;
             if (uniform_s(bits.y) * bound < sigma) {
 #if CLUME_PER_PRIMITIVE
                 f->primitive = groups_pick(leaf.first_group, leaf.group_count, p, uniform_s(bits.z) * density, SCENE);

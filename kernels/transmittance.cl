@@ -85,6 +85,7 @@ static float transmittance_sampled(float3 o, float3 d, float t_end, const Draws*
 #endif
     path->work = f.work;
     path->violations = f.violations;
+    path->tentative = f.tentative;
     return weight;
 }
 

@@ -26,6 +26,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr double kPatience = 1;  ///< seconds from its begin that a batch is waited for after `stop`
+
 double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
@@ -41,7 +43,7 @@ std::string plain(double seconds) {
 class Dispatch {
 public:
     Dispatch(const Workers& workers, const DispatchOptions& options)
-        : workers_(workers), options_(options), plan_(options, workers.size()), held_(workers.size()), alive_(workers.size()) {
+        : workers_(workers), options_(options), plan_(options, workers.size()), held_(workers.size()), started_(workers.size()), alive_(workers.size()) {
         for (const auto& worker : workers) report_.workers.emplace_back().name = worker->name();
         report_.units_of_item.resize(options.items);
         for (std::uint32_t item = 0; item < options.items; ++item) report_.units_total += options.end_of(item) - options.begin;
@@ -84,6 +86,7 @@ private:
         while (!(ended() && under_way_ == 0)) {
             changed_.wait_for(lock, std::chrono::milliseconds(200), [&] { return ended() && under_way_ == 0; });
             give_up_hung();
+            abandon_if_asked();
             if (!tell || !options_.progress || seconds_since(reported_) < 0.19) continue;
             reported_ = Clock::now();
             const DispatchProgress state = progress();
@@ -91,6 +94,14 @@ private:
             options_.progress(state);
             lock.lock();
         }
+    }
+
+    /// A batch may take long where a flight does: nobody who wants to leave waits for it.
+    void abandon_if_asked() {
+        if (under_way_ == 0 || !options_.stop || !options_.stop()) return;
+        stopping_ = true;
+        for (std::size_t w = 0; w < workers_.size(); ++w)
+            if (held_[w] && seconds_since(started_[w]) > kPatience) workers_[w]->set_unwanted(true);
     }
 
     void give_up_hung() {
@@ -125,13 +136,18 @@ private:
             }
             ++under_way_;
             workers_[w]->alive();
+            workers_[w]->set_unwanted(false);
             held_[w] = batch;
+            started_[w] = Clock::now();
             lock.unlock();
             std::string failure;
             std::exception_ptr other;
+            bool abandoned = false;
             const Clock::time_point start = Clock::now();
             try {
                 workers_[w]->run(*batch);
+            } catch (const BatchAbandoned&) {
+                abandoned = true;
             } catch (const DeviceError& error) {
                 failure = error.what();
                 if (failure.empty()) failure = "unknown failure";
@@ -141,7 +157,7 @@ private:
             lock.lock();
             if (!held_[w]) return;  // given up: nobody waits for this thread, nothing it made counts
             held_[w].reset();
-            if (failure.empty() && !other) {
+            if (failure.empty() && !other && !abandoned) {
                 lock.unlock();
                 try {
                     workers_[w]->commit(*batch);
@@ -157,6 +173,10 @@ private:
             if (other) {
                 if (!error_) error_ = other;
                 stopping_ = true;
+                break;
+            }
+            if (abandoned) {
+                plan_.failed(w, *batch);
                 break;
             }
             if (!failure.empty()) {
@@ -194,6 +214,7 @@ private:
     BatchPlan plan_;
     DispatchReport report_;
     std::vector<std::optional<Batch>> held_;  ///< per worker: the batch in its run(), by which it can be given up
+    std::vector<Clock::time_point> started_;  ///< per worker: when that began
     std::exception_ptr error_;
     std::size_t alive_;
     std::size_t under_way_ = 0;

@@ -22,6 +22,9 @@ struct Batch {
     std::uint32_t begin = 0, end = 0;
 };
 
+/// Thrown by Worker::run: the batch is left undone, since nobody waits for it any more.
+struct BatchAbandoned {};
+
 /// What does batches, called from its own thread only, one batch at a time.
 class Worker {
 public:
@@ -30,7 +33,8 @@ public:
     virtual std::string name() const = 0;
     /// Blocks until done, keeping the results to itself. Throws DeviceError if the device failed: then the batch is given to
     /// another worker and this one gets no more. Any other exception ends the dispatch. Warm up (compile) before
-    /// dispatching, since batches are sized by how long they take. Calls alive() with every step that came to its end.
+    /// dispatching, since batches are sized by how long they take. Calls alive() with every step that came to its end, and may
+    /// throw BatchAbandoned after it if the batch is unwanted().
     virtual void run(const Batch& batch) = 0;
     /// Adds what run() has made to the whole; host work only. Not called for a worker that was given up meanwhile.
     virtual void commit(const Batch&) {}
@@ -41,8 +45,13 @@ public:
     void alive() { sign_of_life_.store(std::chrono::steady_clock::now()); }
     double silent_s() const;  ///< since the last one
 
+    /// Of the batch under way: set by dispatch once it has been asked to stop and has waited for the batch for a second.
+    void set_unwanted(bool unwanted) { unwanted_.store(unwanted); }
+    bool unwanted() const { return unwanted_.load(); }
+
 private:
     std::atomic<std::chrono::steady_clock::time_point> sign_of_life_;
+    std::atomic<bool> unwanted_{false};
 };
 
 /// Shared, because a worker that hangs outlives its dispatch together with its thread.
@@ -61,7 +70,7 @@ struct DispatchOptions {
     std::uint32_t fixed_chunk = 0;         ///< units per batch; 0: by measurement
     double target_seconds = 0.15;          ///< per batch; well under a display driver's watchdog
     double hang_seconds = 0;               ///< a worker silent for so long is given up; 0: none ever is
-    std::function<bool()> stop;            ///< asked before each batch, one thread at a time; true: start no more
+    std::function<bool()> stop;            ///< asked before each batch and every 0.2 s, one thread at a time; true: start no more
     std::function<void(const DispatchProgress&)> progress;  ///< called by dispatch's caller's thread, every 0.2 s and at the end
 
     std::uint32_t end_of(std::uint32_t item) const { return std::max(begin, ends.empty() ? end : ends[item]); }
@@ -84,7 +93,7 @@ struct DispatchReport {
     double elapsed_s = 0;
     std::vector<WorkerReport> workers;         ///< in the order given
     std::vector<std::uint32_t> units_of_item;  ///< done: the first units of the range, the item's `gaps` left out
-    std::vector<Batch> gaps;                   ///< held by a dropped worker and not redone
+    std::vector<Batch> gaps;                   ///< abandoned, or held by a dropped worker, and not redone
     std::vector<std::string> warnings;         ///< one per dropped worker
 };
 

@@ -7,6 +7,8 @@
 #include <numeric>
 
 #include "runtime/program.h"
+#include "src/error.h"
+#include "src/work_weights.h"
 
 namespace clume {
 namespace {
@@ -19,6 +21,13 @@ constexpr unsigned kFirstBatchArg = SceneBuffers::kArgs + 1;  // after the scene
 
 std::size_t items_wanted(const DeviceInfo& info) {
     return info.type == "gpu" ? std::size_t{2048} * info.compute_units : std::size_t{128} * std::max(1u, info.compute_units);
+}
+
+double work_of(std::span<const std::uint64_t> sums) {
+    double ns = 0;
+    for (std::size_t row = 0; row < sums.size(); row += FILM_WORDS)
+        for (std::size_t k = 0; k < WORK_KINDS; ++k) ns += work_weights_ns[k] * static_cast<double>(sums[row + FILM_WORK + k]);
+    return ns;
 }
 
 }  // namespace
@@ -128,11 +137,20 @@ DeviceRenderer::Piece DeviceRenderer::render(std::size_t first, std::size_t coun
         alive();
         if (left == 0) break;
         if (left > items) throw DeviceError(queue_.label() + " gives nonsense: " + std::to_string(left) + " of " + std::to_string(items) + " work-items are unfinished");
+        check_work(rows);
+        if (unwanted()) throw BatchAbandoned();
         resume = 1;
     }
     piece.sums.resize(rows * FILM_WORDS);
     sums_.download(std::span(piece.sums));
     return piece;
+}
+
+void DeviceRenderer::check_work(std::size_t rows) {
+    if (!(most_work_ns_ > 0)) return;
+    std::vector<std::uint64_t> sums(rows * FILM_WORDS);
+    sums_.download(std::span(sums));
+    if (work_ns_ + work_of(sums) > most_work_ns_) throw TooMuchWork();
 }
 
 void DeviceRenderer::run(const Batch& batch) {
@@ -161,6 +179,8 @@ void DeviceRenderer::run(const Batch& batch) {
 
 void DeviceRenderer::commit(const Batch& batch) {
     assert(film_ != nullptr);
+    if (most_work_ns_ > 0)
+        for (const Piece& p : pieces_) work_ns_ += work_of(p.sums);
     for (const Piece& p : pieces_) {
         film_->add(std::span(order_).subspan(p.first, p.count), p.splits, batch.end - batch.begin, p.sums);
         paths_ += p.count * std::uint64_t{batch.end - batch.begin};

@@ -15,6 +15,9 @@
 
 namespace clume {
 
+/// Thrown where work is limited.
+struct TooMuchWork {};
+
 /// Half-open range of the list of active pixels, or of an order of them.
 struct Tile {
     std::uint32_t first = 0, count = 0;
@@ -44,6 +47,9 @@ public:
     /// Paths of the batches that it has added to the film that it was last aimed at.
     std::uint64_t paths() const { return paths_; }
 
+    /// From now on run() throws TooMuchWork once paths have cost more, of a program that counts its work (src/work_weights.h).
+    void limit_work(double ns) { most_work_ns_ = ns; }
+
     /// Work-items that fitted into the device's memory when a batch did not; 0 if all did.
     std::size_t short_of_memory() const { return short_of_memory_; }
 
@@ -61,6 +67,8 @@ private:
     /// Renders samples [begin, end) of the pixels.
     Piece render(std::size_t first, std::size_t count, std::uint32_t begin, std::uint32_t end);
     void launch(std::size_t items);
+    /// What the batches so far and the rows of this one have cost, against the limit.
+    void check_work(std::size_t rows);
     /// Rows of sums that a work-item fills, of so many with so many samples each.
     std::size_t rows_per_item(std::size_t rows, std::size_t samples) const;
     /// Uploads what aim() and set_learned() have left to do: all calls that may fail or hang are made inside run().
@@ -89,6 +97,8 @@ private:
     std::size_t units_;                      ///< compute units
     std::size_t most_items_ = SIZE_MAX;      ///< work-items that fit its memory, as far as known
     std::size_t short_of_memory_ = 0;
+    double most_work_ns_ = 0;                ///< 0: no limit
+    double work_ns_ = 0;                     ///< of the batches committed, if there is a limit
     std::uint64_t paths_ = 0;
 };
 

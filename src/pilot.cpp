@@ -6,11 +6,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <fmt/format.h>
+#include <limits>
 #include <sstream>
 
 #include "runtime/hash.h"
 #include "runtime/disk_cache.h"
 #include "src/device_lights.h"
+#include "src/device_renderer.h"
 #include "src/device_scene.h"
 #include "src/error.h"
 #include "src/work_weights.h"
@@ -22,7 +24,7 @@ constexpr std::uint32_t kPixels = 1024;     ///< at most
 constexpr std::uint32_t kSamples = 16;      ///< of each
 constexpr std::uint32_t kFirstSample = 0xc0000000u;  ///< numbers of their own: the image's noise is not what was chosen by
 constexpr std::size_t kFewPrimitives = 64;  ///< up to which one bound for the whole scene may be the cheapest
-constexpr int kVersion = 5;                 ///< of the candidates and of how they are measured
+constexpr int kVersion = 6;                 ///< of the candidates and of how they are measured
 
 std::size_t primitive_count(const Scene& scene) {
     std::size_t count = 0;
@@ -43,15 +45,28 @@ struct Until {
     bool over() const { return stop.load() || left_s() == 0.0; }
 };
 
-/// `pixels` becomes the number rendered.
-PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const Until& until, std::uint32_t& pixels) {
-    PilotRow row{pair, 0, 0, {}};
+std::size_t best_of(const std::vector<PilotRow>& rows) {
+    std::size_t best = rows.size();
+    for (std::size_t i = 0; i < rows.size(); ++i)
+        if (rows[i].measured() && (best == rows.size() || rows[i].inverse_efficiency() < rows[best].inverse_efficiency())) best = i;
+    return best;
+}
+
+/// A row for the pair, after those that there are. `pixels` becomes the number rendered. What is given up follows from counted work
+/// alone, so it is the same on any device and in batches of any size.
+PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const Until& until, const std::vector<PilotRow>& others, std::uint32_t& pixels) {
+    double most_ns = std::numeric_limits<double>::infinity();  // of a path
+    for (const PilotRow& r : others)
+        if (r.measured()) most_ns = std::min(most_ns, pilot_patience * r.work_ns);
+    PilotRow row;
+    row.pair = pair;
     try {
         RenderOptions o = options;
         o.count_work = true;
         o.crop.reset();
         o.noise_threshold.reset();
         o.most_pixels = kPixels;
+        if (std::isfinite(most_ns)) o.most_work_ns = most_ns * kSamples * pixels;
         Renderer renderer(with_pair(scene, pair), o);
         Accumulation film = renderer.start(scene.render.seed, kFirstSample);
         pixels = renderer.rendered_pixels();
@@ -62,18 +77,15 @@ PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodP
         for (const float v : r.image.variance) row.variance += static_cast<double>(v);
         const double paths = static_cast<double>(pixels) * kSamples;
         row.work_ns /= paths;
+        row.too_slow = row.work_ns > most_ns;
         row.variance *= kSamples / (3.0 * static_cast<double>(pixels));
+    } catch (const TooMuchWork&) {
+        row.too_slow = true;
     } catch (const RenderError& e) {
         row.error = e.what();
     }
+    if (row.too_slow) row.work_ns = most_ns;
     return row;
-}
-
-std::size_t best_of(const std::vector<PilotRow>& rows) {
-    std::size_t best = rows.size();
-    for (std::size_t i = 0; i < rows.size(); ++i)
-        if (rows[i].error.empty() && (best == rows.size() || rows[i].inverse_efficiency() < rows[best].inverse_efficiency())) best = i;
-    return best;
 }
 
 /// No rows if there is nothing to measure.
@@ -94,23 +106,25 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const Until&
                 candidates.push_back({s.name, estimator, bound});
             }
     }
+    // Null collisions may take for ever in dense or flat media: the others come first.
+    std::stable_partition(candidates.begin(), candidates.end(), [](const MethodPair& pair) { return !find_strategy(pair.strategy)->null_collisions; });
     // Distances drawn by unbiased strategies have one distribution: what tells them apart is work, whatever the estimator.
     for (const MethodPair& pair : candidates) {
-        pilot.rows.push_back(measure(scene, options, pair, until, pilot.pixels));
+        pilot.rows.push_back(measure(scene, options, pair, until, pilot.rows, pilot.pixels));
         if (until.over() || (pilot.rows.back().error.empty() && pilot.pixels == 0)) return {};
     }
     double variance = 0, measured = 0;
     for (const PilotRow& row : pilot.rows)
-        if (row.error.empty()) variance += row.variance, measured += 1;
+        if (row.measured()) variance += row.variance, measured += 1;
     if (measured == 0) throw RenderError(fmt::format("{}: no strategy could be tried: {}", scene.path, pilot.rows.front().error));
     for (PilotRow& row : pilot.rows)
-        if (row.error.empty()) row.variance = variance / measured;
+        if (row.measured()) row.variance = variance / measured;
     pilot.chosen = best_of(pilot.rows);
     if (scene.render.transmittance != "auto" || !samples_lights(scene)) return pilot;
     const MethodPair winner = pilot.rows[pilot.chosen].pair;
     for (const Method& e : estimators()) {
         if (e.kind != BiasKind::unbiased || e.name == estimator) continue;
-        pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, until, pilot.pixels));
+        pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, until, {pilot.rows[pilot.chosen]}, pilot.pixels));
         if (until.over()) return {};
     }
     const std::size_t best = best_of(pilot.rows);
@@ -120,7 +134,7 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const Until&
 
 std::string to_text(const Pilot& pilot) {
     std::string text = fmt::format("{} {} {} {}\n", pilot.chosen, pilot.pixels, pilot.spp, pilot.rows.size());
-    for (const PilotRow& r : pilot.rows) text += fmt::format("{} {} {} {:.17g} {:.17g}\n", r.pair.strategy, r.pair.estimator, r.pair.bound, r.variance, r.work_ns);
+    for (const PilotRow& r : pilot.rows) text += fmt::format("{} {} {} {:.17g} {:.17g} {}\n", r.pair.strategy, r.pair.estimator, r.pair.bound, r.variance, r.work_ns, int{r.too_slow});
     return text;
 }
 
@@ -131,7 +145,7 @@ std::optional<Pilot> from_text(const std::string& text) {
     if (!(in >> pilot.chosen >> pilot.pixels >> pilot.spp >> rows) || rows > 64) return std::nullopt;
     for (std::size_t i = 0; i < rows; ++i) {
         PilotRow r;
-        if (!(in >> r.pair.strategy >> r.pair.estimator >> r.pair.bound >> r.variance >> r.work_ns)) return std::nullopt;
+        if (!(in >> r.pair.strategy >> r.pair.estimator >> r.pair.bound >> r.variance >> r.work_ns >> r.too_slow)) return std::nullopt;
         if (!find_strategy(r.pair.strategy) || !find_estimator(r.pair.estimator)) return std::nullopt;
         pilot.rows.push_back(std::move(r));
     }
@@ -149,7 +163,8 @@ std::vector<std::pair<std::string, std::string>> Pilot::table() const {
     std::vector<std::pair<std::string, std::string>> lines;
     for (std::size_t i = 0; i < rows.size(); ++i) {
         const PilotRow& r = rows[i];
-        const std::string what = r.error.empty() ? fmt::format("variance {:.4g}, work {:.0f} ns per path, inverse efficiency {:.4g}{}", r.variance, r.work_ns, r.inverse_efficiency(), i == chosen ? "  <- chosen" : "")
+        const std::string what = r.too_slow ? fmt::format("given up: work above {:.0f} ns per path, {:.0f} times the least", r.work_ns, pilot_patience)
+                                 : r.error.empty() ? fmt::format("variance {:.4g}, work {:.0f} ns per path, inverse efficiency {:.4g}{}", r.variance, r.work_ns, r.inverse_efficiency(), i == chosen ? "  <- chosen" : "")
                                                  : "not measured: " + r.error;
         lines.emplace_back("pilot " + r.pair.label(), what);
     }

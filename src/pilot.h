@@ -19,12 +19,16 @@ namespace clume {
 
 /// By how much another estimator must be ahead of the winner's own to replace it: more than the weights are off by.
 inline constexpr double pilot_margin = 1.3;
+/// A pair is given up once it has taken that many times the work of the best one so far: variances differ by less.
+inline constexpr double pilot_patience = 16;
 
 struct PilotRow {
     MethodPair pair;
     double variance = 0;   ///< of one sample, mean over the pilot's pixels and channels
     double work_ns = 0;    ///< of one path
-    std::string error;     ///< why it could not be measured
+    bool too_slow = false; ///< given up: the work is what it takes at least
+    std::string error;     ///< why it could not be tried
+    bool measured() const { return error.empty() && !too_slow; }
     double inverse_efficiency() const { return variance * work_ns; }
 };
 

@@ -36,6 +36,7 @@ struct RenderOptions {
     int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own
     std::uint32_t most_pixels = 0;             ///< > 0: a pilot: at most so many of the pixels that meet something, by a program that is sooner built
     bool count_work = false;                   ///< count operations (stats.work, image.tests): costs a few per cent of speed
+    double most_work_ns = 0;                   ///< > 0: a pilot: extend() throws TooMuchWork (src/device_renderer.h) once its paths cost more
     bool kept_cells = true;                    ///< cells that took long to build are kept on disk, and read from there (src/cell_cache.h)
     std::string accelerator = "auto";          ///< of what visits chords (decomposition, analytic, march): "cells", "bvh" or "auto"
     double progressive_start = 1;              ///< factor on the first bounds of `progressive`

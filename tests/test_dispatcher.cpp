@@ -185,6 +185,36 @@ TEST_CASE("Dispatcher.StopAtOnceDoesNothing", "[quick]") {
     CHECK(ledger.done.empty());
 }
 
+TEST_CASE("Dispatcher.NobodyWaitsForABatchThatTakesLong", "[quick]") {
+    // Asked to stop, batches under way are waited for for a second; what takes longer is left, if its worker looks.
+    Ledger ledger;
+    Workers workers = stubs(ledger, 1);
+    Worker* self = nullptr;
+    std::atomic<bool> stop{false};
+    workers.push_back(std::make_shared<StubWorker>(ledger, [&](const Batch&) {
+        stop = true;
+        while (!self->unwanted()) pause(1e-3);
+        throw BatchAbandoned();
+    }));
+    self = workers[1].get();
+    workers[0] = std::make_shared<StubWorker>(ledger, [&](const Batch&) {
+        while (!stop) pause(1e-4);
+        pause(0.3);
+    });
+    DispatchOptions options = grid(8, 0, 4);
+    options.fixed_chunk = 1;
+    options.stop = [&] { return stop.load(); };
+    const auto start = std::chrono::steady_clock::now();
+    const DispatchReport report = dispatch(workers, options);
+    CHECK(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < 20);
+    CHECK(report.stopped);
+    CHECK_FALSE(report.failed);
+    CHECK(report.units_done == 1);
+    CHECK(ledger.done.size() == 1);
+    CHECK(report.gaps.size() == 1);
+    CHECK(report.warnings.empty());
+}
+
 TEST_CASE("Dispatcher.FailedBatchIsRedoneByAnother", "[quick]") {
     for (const std::uint32_t chunk : {0u, 3u}) {
         Ledger ledger;

@@ -89,6 +89,29 @@ TEST_CASE("Pilot.FindsWhatIsCheapest") {
     CHECK(work[1] < work[2]);
 }
 
+TEST_CASE("Pilot.GivesUpWhatTakesForEver") {
+    // A million mean free paths deep: null collisions beside the ball, where a cell's bound still holds, hardly move a ray.
+    const test::TempFolder folder;
+    Scene scene = lit_mixture(1, 1);
+    scene.media[0].kernel = KernelFamily::uniform;
+    scene.media[0].density_scale = 1e7;
+    const auto pilot = run_pilot(scene, {}, folder.path(), go_on);
+    REQUIRE(pilot);
+    CHECK(pilot->rows[pilot->chosen].measured());
+    CHECK(pilot->rows.front().pair.strategy == "decomposition");
+    std::size_t given_up = 0;
+    for (const PilotRow& row : pilot->rows) {
+        INFO(row.pair.label() << ", work " << row.work_ns);
+        CHECK(row.error.empty());
+        given_up += row.too_slow;
+        if (row.too_slow) CHECK(row.work_ns >= pilot_patience * pilot->rows[pilot->chosen].work_ns);
+    }
+    CHECK(given_up >= 1);
+    const auto again = run_pilot(scene, {}, folder.path(), go_on);  // kept, with what was given up
+    REQUIRE(again);
+    for (std::size_t i = 0; i < pilot->rows.size(); ++i) CHECK(again->rows[i].too_slow == pilot->rows[i].too_slow);
+}
+
 TEST_CASE("Pilot.NotWhereNothingIsToChoose", "[quick]") {
     const test::TempFolder folder;
     Scene scene = lit_mixture(5, 3);

@@ -192,3 +192,26 @@ TEST_CASE("Files.ReaderOfTheProgressGoesAway") {
     CHECK(run.out == "puff.exr\npuff.png\n");
     check_files(folder.path);
 }
+
+TEST_CASE("Binary.FlightsThatNeverEndAreNoHangAndCanBeStopped") {
+    // Scattering without absorption ten thousand million mean free paths deep: batches that take for ever, in launches that don't. A device that
+    // does them lives; who asks it to stop does not wait for them.
+    const SceneFolder folder;
+    std::ofstream(folder.path / "deep.json") << R"({ "camera": { "origin": [0,0,-4], "target": [0,0,0] }, "film": { "width": 16, "height": 16 }, "lights": [{ "type": "constant", "radiance": 1 }],
+        "media": [{ "type": "ellipsoids", "kernel": "uniform", "albedo": 1, "primitives": [{ "center": [0,0,0], "scale": 0.3, "density": 1e10 }] }] })";
+    for (const char* strategy : {"delta", "decomposition"})
+        for (const bool signal : {false, true}) {
+            INFO(strategy << (signal ? ", SIGINT" : ", time limit"));
+            Words words{"render", "deep.json", "--quiet", "--strategy", strategy, "--kernel-timeout", "10"};
+            if (!signal) words.insert(words.end(), {"--time-limit", "12"});
+            Process process(words, folder.path);
+            if (signal) {
+                std::this_thread::sleep_for(std::chrono::seconds(6));
+                process.send(SIGINT);
+            }
+            const int code = process.wait(60);
+            CHECK((signal ? code == 130 : code == 0 || code == 1));  // with a sample or without
+            CHECK_THAT(process.err, Catch::Contains(signal ? "interrupted" : "time limit"));
+            CHECK_THAT(process.err, !Catch::Contains("hangs"));
+        }
+}
