@@ -5,7 +5,7 @@
 // no memory, and when that is done depends on what is behind alone, so the distribution stays what it is.
 #include "medium.cl"
 
-#ifndef CLUME_PATIENCE  // tentative collisions of a flight or an estimate between two such cells
+#ifndef CLUME_PATIENCE  // tentative collisions of a flight or an estimate between two such cells: a power of two
 #define CLUME_PATIENCE 256
 #endif
 

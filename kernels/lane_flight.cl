@@ -73,26 +73,16 @@ static vint lanes_begin(LaneFlights* f, vfloat t_end, const LaneDraws* r, vint m
     return under_way;
 }
 
-/// Leaves the rest of their cells, up to `end`, to cell_decompose; returns the lanes that collide there.
-static vint lanes_rest(LaneFlights* f, const LaneDraws* r, vfloat end, vint stuck, vint* result, __global const Reference* references, __global const Primitive* primitives) {
-    vint collided = (vint)0;
-    for (int i = 0; i < CLUME_WIDTH; ++i) {
-        if (!LANE_OF(int, stuck, i)) continue;
-        const Draws own = {LANE_OF(uint, r->sample, i), LANE_OF(uint, r->pixel, i), LANE_OF(uint, r->depth, i), r->seed};
-        const float last = LANE_OF(float, end, i);
-        const float t = cell_decompose(LANE_OF(uint, f->reference, i), LANE_OF(uint, f->count, i), lane_origin(f, i), lane_direction(f, i), LANE_OF(float, f->t, i), last,
-                                       draw_key(&own, LANE_OF(uint, f->draw, i) ^ DRAW_REST), (uint*)&f->primitive + i, references, primitives);
-        ((float*)&f->t)[i] = min_s(t, last);
-        if (!(t < CLUME_INFINITY)) continue;
-        ((int*)result)[i] = FLIGHT_COLLIDED;
-        ((int*)&collided)[i] = -1;
-    }
-    return collided;
-}
+// Of tentative collisions that a flight has drawn, a multiple of this may be one of CLUME_FLIGHT_DRAWS or CLUME_PATIENCE.
+#if CLUME_FLIGHT_DRAWS < CLUME_PATIENCE
+#define LANES_MANY CLUME_FLIGHT_DRAWS
+#else
+#define LANES_MANY CLUME_PATIENCE
+#endif
 
-/// Flies the lanes in *under_way until no more than `enough` are; those that end are taken out of it, and set *result.
-/// *above: −1 per lane for each look-up above its bound.
-static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint* result, int enough, vint* above, SCENE_ARGS) {
+/// Flies the lanes in *under_way until no more than `enough` are; those that end, or have drawn a multiple of LANES_MANY, are taken
+/// out of it, and set *result. *above: −1 per lane for each look-up above its bound.
+static void lanes_fly_on(LaneFlights* f, const LaneDraws* r, vint* under_way, vint* result, int enough, vint* above, SCENE_ARGS) {
     for (;;) {
         // Steps are cheap beside collisions: most lanes are brought to one first.
         vfloat end;
@@ -120,16 +110,34 @@ static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint*
             *above += tentative & (probability > (vfloat)1.0f);
             LANE_SET(f->draw, f->draw + 1u, tentative);
             const vint real = tentative & (uniform_v(f->accept) < probability);
-            const vint pause = tentative & ~real & ((f->draw % (vuint)CLUME_FLIGHT_DRAWS) == (vuint)0u);
-            const vint stuck = tentative & ~real & ~pause & ((f->draw % (vuint)CLUME_PATIENCE) == (vuint)0u);
             LANE_SET(f->primitive, primitive, real);
+            const vint many = tentative & ~real & ((f->draw % (vuint)LANES_MANY) == (vuint)0u);
             LANE_SET(*result, (vint)FLIGHT_COLLIDED, real);
-            LANE_SET(*result, (vint)FLIGHT_PAUSED, pause);
-            *under_way &= ~(real | pause);
-            if (vany(stuck)) *under_way &= ~lanes_rest(f, r, end, stuck, result, references, primitives);
+            LANE_SET(*result, (vint)FLIGHT_PAUSED, many);
+            *under_way &= ~(real | many);
             lanes_draw(f, r, tentative);
         }
         if (lanes_count(*under_way) <= enough) return;
+    }
+}
+
+/// Flies the lanes in *under_way until no more than `enough` are; those that end, or pause, are taken out of it, and set *result.
+static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint* result, int enough, vint* above, SCENE_ARGS) {
+    const vint before = *under_way;
+    lanes_fly_on(f, r, under_way, result, enough, above, SCENE);
+    const vint many = before & ~*under_way & (*result == (vint)FLIGHT_PAUSED) & ((f->draw % (vuint)CLUME_FLIGHT_DRAWS) != (vuint)0u);
+    if (!vany(many)) return;
+    // Out of patience: the rest of their cells is left to cell_decompose.
+    for (int i = 0; i < CLUME_WIDTH; ++i) {
+        if (!LANE_OF(int, many, i)) continue;
+        const Draws own = {LANE_OF(uint, r->sample, i), LANE_OF(uint, r->pixel, i), LANE_OF(uint, r->depth, i), r->seed};
+        const float end = min_s(LANE_OF(float, f->t_exit, i), LANE_OF(float, f->t_end, i));
+        const float t = cell_decompose(LANE_OF(uint, f->reference, i), LANE_OF(uint, f->count, i), lane_origin(f, i), lane_direction(f, i), LANE_OF(float, f->t, i), end,
+                                       draw_key(&own, LANE_OF(uint, f->draw, i) ^ DRAW_REST), (uint*)&f->primitive + i, references, primitives);
+        const bool collided = t < CLUME_INFINITY;
+        ((float*)&f->t)[i] = collided ? t : end;
+        ((int*)result)[i] = collided ? FLIGHT_COLLIDED : FLIGHT_ESCAPED;
+        ((int*)under_way)[i] = collided ? 0 : -1;
     }
 }
 
