@@ -13,6 +13,7 @@
 #include "src/device_renderer.h"
 #include "src/device_scene.h"
 #include "src/film.h"
+#include "tests/image_test.h"
 
 namespace clume::test {
 
@@ -58,6 +59,18 @@ inline DeviceImage render_device(const Scene& scene, const DeviceScene& device, 
     image.nonfinite = film.nonfinite();
     image.violations = film.violations();
     return image;
+}
+
+/// What no path is rendered for counts as black.
+inline Estimate colour_of(const DeviceImage& image, const Film& film) {
+    Estimate e{film.width, film.height, std::vector<double>(3 * static_cast<std::size_t>(film.width) * static_cast<std::size_t>(film.height)), {}};
+    e.variance = e.mean;
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+        for (std::size_t c = 0; c < 3; ++c) {
+            e.mean[3 * image.pixels[i] + c] = image.values[i].mean[c];
+            e.variance[3 * image.pixels[i] + c] = image.values[i].variance[c];
+        }
+    return e;
 }
 
 }  // namespace clume::test

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Null collisions that leave the rest of a cell to decomposition (kernels/cell_rest.cl): with the least patience that is done all the
 // time, and images stay what they are; at every width the same bits; and what null collisions alone would never leave ends soon.
+#include "src/strategies.h"
 #include "tests/device_image.h"
 #include "tests/image_test.h"
 #include "tests/pairs.h"
@@ -15,24 +16,6 @@ DeviceScene impatient(const Scene& scene) {
     DeviceScene device = make_device_scene(scene, {});
     set_define(device, "CLUME_PATIENCE", "1");
     return device;
-}
-
-Estimate estimate(const DeviceImage& image, const Film& film) {
-    Estimate e{film.width, film.height, std::vector<double>(3 * static_cast<std::size_t>(film.width * film.height)), {}};
-    e.variance = e.mean;
-    for (std::size_t i = 0; i < image.pixels.size(); ++i)
-        for (std::size_t c = 0; c < 3; ++c) {
-            e.mean[3 * image.pixels[i] + c] = image.values[i].mean[c];
-            e.variance[3 * image.pixels[i] + c] = image.values[i].variance[c];
-        }
-    return e;
-}
-
-Scene with(Scene scene, const Pair& pair) {
-    scene.render.strategy = pair.strategy;
-    scene.render.transmittance = pair.estimator;
-    scene.render.bound = pair.bound;
-    return scene;
 }
 
 /// One disc, a ten-thousandth as thick as wide and tilted: the cells that hold it are nearly empty, their bounds are not.
@@ -55,10 +38,10 @@ TEST_CASE("CellRest.ImagesStayWhatTheyAre") {
     Scene lit = grey_mixture();
     lit.lights = {cases::light(LightKind::rectangle), cases::light(LightKind::directional)};
     const std::vector<Scene> scenes{lit, mixed_scene(), mixed_grid_scene()};
-    for (const Pair& pair : {Pair{"delta", "analytic", "tree"}, {"delta", "binary", "tree"}, {"delta", "ratio", "grid"}, {"delta", "residual-ratio", "tree"}, {"regular", "ratio", "tree"}})
+    for (const MethodPair& pair : {MethodPair{"delta", "analytic", "tree"}, {"delta", "binary", "tree"}, {"delta", "ratio", "grid"}, {"delta", "residual-ratio", "tree"}, {"regular", "ratio", "tree"}})
         for (const Scene& scene : scenes) {
-            const Scene s = with(scene, pair);
-            check_same("cell_rest " + pair.name(), estimate(render_device(s, impatient(s), 512), s.film), colour_of(render_pair({"decomposition"}, scene, 1024, 7).image));
+            const Scene s = with_pair(scene, pair);
+            check_same("cell_rest " + pair.label(), colour_of(render_device(s, impatient(s), 512), s.film), colour_of(render_pair({"decomposition"}, scene, 1024, 7).image));
         }
 }
 
@@ -66,7 +49,7 @@ TEST_CASE("CellRest.SameBitsAtEveryWidth") {
     Scene lit = grey_mixture();
     lit.lights = {cases::light(LightKind::rectangle)};
     for (const char* estimator : {"binary", "ratio"}) {
-        const Scene scene = with(lit, {"delta", estimator, "tree"});
+        const Scene scene = with_pair(lit, {"delta", estimator, "tree"});
         const DeviceScene device = impatient(scene);
         const DeviceImage first = render_device(scene, device, 8, probing::test_device(), 16);
         for (const int width : {8, 4, 1}) CHECK(first.same_bits(render_device(scene, device, 8, probing::test_device(), width)));
@@ -76,7 +59,7 @@ TEST_CASE("CellRest.SameBitsAtEveryWidth") {
 TEST_CASE("CellRest.ThinDiscsTakeFewCollisions") {
     // Under its bound a ray through the cells draws ten thousand tentative collisions; with patience some hundreds, for the same light.
     for (const double depth : {0.7, 30.0}) {
-        Scene scene = with(disc(depth), {"delta", "analytic", "tree"});
+        Scene scene = with_pair(disc(depth), {"delta", "analytic", "tree"});
         const RenderOptions counted = [] {
             RenderOptions o;
             o.count_work = true;
