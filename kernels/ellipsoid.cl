@@ -10,9 +10,7 @@ typedef struct {
     vfloat t_perp, w, inverse_w, d2, h, t_in, t_out;
 } Chord;
 
-/// Whitens o − mu and d, and finds the chord inside whitened radius sqrt(e2); mask of lanes hit by the full line.
-/// The points o + t d at entry and exit lie on the surface, ends error < 2 ulp of the radius; a hit is lost or invented by lines that
-/// are no farther than that from tangency. d needs not be normalised.
+/// `intersect`, the rows of a primitive per lane being given.
 static vint intersect_rows(vfloat mu_x, vfloat mu_y, vfloat mu_z, vfloat w00, vfloat w01, vfloat w02, vfloat w11, vfloat w12, vfloat w22, float3 o, float3 d, float e2, Chord* c) {
     const vfloat x = o.x - mu_x, y = o.y - mu_y, z = o.z - mu_z;
     const vfloat a0 = fma(w00, x, fma(w01, y, w02 * z)), a1 = fma(w11, y, w12 * z), a2 = w22 * z;
@@ -31,6 +29,9 @@ static vint intersect_rows(vfloat mu_x, vfloat mu_y, vfloat mu_z, vfloat w00, vf
     return hit;
 }
 
+/// Whitens o − mu and d, and finds the chord inside whitened radius sqrt(e2); mask of lanes hit by the full line.
+/// The points o + t d at entry and exit lie on the surface, ends error < 2 ulp of the radius; a hit is lost or invented by lines that
+/// are no farther than that from tangency. d needs not be normalised.
 static vint intersect(__global const float* part, float3 o, float3 d, float e2, Chord* c) {
     return intersect_rows(vload_row(part), vload_row(part + 16), vload_row(part + 32), vload_row(part + 48), vload_row(part + 64), vload_row(part + 80), vload_row(part + 96),
                           vload_row(part + 112), vload_row(part + 128), o, d, e2, c);

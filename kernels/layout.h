@@ -23,7 +23,7 @@
 //   grid_values float[729]           per brick: 9 × 9 × 9 samples, x fastest
 //   pixels   uint                    film index (x + width * y) of each pixel that the batch renders
 //   states   PathState               per row of sums, or per lane of a work-item; kept between launches
-//   sums     ulong[FILM_WORDS]       per row: a share of one pixel's samples, 128-bit fixed point (film.cl)
+//   sums     ulong[FILM_WORDS]       per row: a share of one pixel's samples, 128-bit fixed point (film.cl); zeros at first
 #ifndef CLUME_LAYOUT_H
 #define CLUME_LAYOUT_H
 

@@ -212,8 +212,6 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
             rows_enter(&rows, i, i, first_sample(i, &share), &share, pixels, params);
         }
     }
-    if (!resume)
-        for (uint i = 0; i < rows.count * FILM_WORDS; ++i) sums[i] = 0;
     int events = 0;
     vint waiting = l.alive, out = (vint)0;  // paths about to fly; paths flying, or at the end of a flight
     for (;;) {

@@ -61,6 +61,7 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
     if (!tiles.empty()) {
         states_ = Buffer<device::PathState>(queue_, lanes_);
         sums_ = Buffer<std::uint64_t>(queue_, FILM_WORDS);
+        sums_.upload(std::vector<std::uint64_t>(FILM_WORDS));
         set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(0), cl_uint(1), cl_uint(1), cl_uint(0), cl_uint(0), cl_uint(lanes_), cl_uint(0));
         launch(1);
     }
@@ -125,6 +126,7 @@ DeviceRenderer::Piece DeviceRenderer::render(std::size_t first, std::size_t coun
         states_ = Buffer<device::PathState>(queue_, items * lanes_);
         sums_ = Buffer<std::uint64_t>(queue_, rows * FILM_WORDS);
     }
+    sums_.upload(std::vector<std::uint64_t>(rows * FILM_WORDS));  // by the host: Oclgrind does not know buffers that kernels or fills have made
     cl_uint resume = 0;
     for (;;) {
         const device::uint none = 0;

@@ -159,7 +159,7 @@ TEST_CASE("Dispatcher.ItemsOfUnlikeLengthAdvanceByShares", "[quick]") {
     DispatchOptions options = grid(20, 0, 0);
     for (std::uint32_t item = 0; item < options.items; ++item) options.ends.push_back(100 * (1 + item));
     options.target_seconds = 0.001;
-    std::uint32_t units = 0;
+    std::atomic<std::uint32_t> units = 0;
     options.stop = [&] { return units > 10000; };  // of 21,000
     const DispatchReport report = dispatch(stubs(ledger, 1,
                                                  [&](const Batch& b) {
@@ -191,15 +191,17 @@ TEST_CASE("Dispatcher.NobodyWaitsForABatchThatTakesLong", "[quick]") {
     Workers workers = stubs(ledger, 1);
     Worker* self = nullptr;
     std::atomic<bool> stop{false};
+    std::atomic<int> brief{0};
     workers.push_back(std::make_shared<StubWorker>(ledger, [&](const Batch&) {
+        wait_for(brief, 1);
         stop = true;
         while (!self->unwanted()) pause(1e-3);
         throw BatchAbandoned();
     }));
     self = workers[1].get();
     workers[0] = std::make_shared<StubWorker>(ledger, [&](const Batch&) {
+        ++brief;
         while (!stop) pause(1e-4);
-        pause(0.3);
     });
     DispatchOptions options = grid(8, 0, 4);
     options.fixed_chunk = 1;

@@ -39,7 +39,8 @@ TEST_CASE("Scene.UnknownAndDuplicateKeys", "[quick]") {
     check_error("\"film\"", "\"flim\"", "s.json:3:3: unknown key \"flim\" in scene; did you mean \"film\"?");
     check_error("\"origin\"", "\"orgin\"",
                 "s.json:2:15: unknown key \"orgin\" in camera of type \"perspective\"; did you mean \"origin\"?");
-    check_error("\"spp\"", "\"samples\"", "s.json:4:15: unknown key \"samples\" in render", "known: spp, seed");
+    check_error("\"spp\"", "\"quality\"", "s.json:4:15: unknown key \"quality\" in render", "known: spp, seed");
+    check_error("\"spp\"", "\"samples\"", "s.json:4:15: unknown key \"samples\" in render; did you mean \"sampler\"?");
     check_error("\"density\"", "\"denisty\"", "s.json:7:66: unknown key \"denisty\" in primitive; did you mean \"density\"?");
     check_error("\"height\"", "\"width\"", "s.json:3:26: duplicate key \"width\"");
     check_error(camera, camera + R"(, "width": 2)",
