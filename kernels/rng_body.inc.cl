@@ -23,13 +23,16 @@ static void FN(philox)(VU* c0, VU* c1, VU* c2, VU* c3, uint2 key) {
 }
 
 #if CLUME_SOBOL
-/// The bits of x in reverse order.
+/// Swaps the bits of x in the mask with those `distance` above them.
+static VU FN(swap_bits)(VU x, uint distance, uint mask) {
+    const VU t = ((x >> (VU)distance) ^ x) & (VU)mask;
+    return x ^ t ^ (t << (VU)distance);
+}
+
+/// The bits of x in reverse order. Not by shifts and `|`: compilers make an intrinsic of them that Oclgrind 21.10 does not know.
 static VU FN(reverse)(VU x) {
-    x = (x >> (VU)16) | (x << (VU)16);
-    x = ((x >> (VU)8) & (VU)0x00ff00ffu) | ((x & (VU)0x00ff00ffu) << (VU)8);
-    x = ((x >> (VU)4) & (VU)0x0f0f0f0fu) | ((x & (VU)0x0f0f0f0fu) << (VU)4);
-    x = ((x >> (VU)2) & (VU)0x33333333u) | ((x & (VU)0x33333333u) << (VU)2);
-    return ((x >> (VU)1) & (VU)0x55555555u) | ((x & (VU)0x55555555u) << (VU)1);
+    x = FN(swap_bits)(FN(swap_bits)(FN(swap_bits)(x, 16u, 0x0000ffffu), 8u, 0x00ff00ffu), 4u, 0x0f0f0f0fu);
+    return FN(swap_bits)(FN(swap_bits)(x, 2u, 0x33333333u), 1u, 0x55555555u);
 }
 
 /// Nested permutation [Owen95]: every bit is flipped by a hash of the seed and of the bits below it [Laine11], Vegdahl's constants.
