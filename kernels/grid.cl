@@ -17,7 +17,7 @@
 
 /// Random bits of grid g, number n of its own sequence; `range` is DRAW_GRID_*. Past 2^20 the depth's upper bits tell apart.
 static uint4 grid_bits(const Draws* r, uint range, uint g, uint n) {
-    return draw_words(r->sample, r->pixel, r->depth ^ ((n >> 20) << 24), range + (g << 20) + (n & 0xfffffu), r->seed);
+    return draw_words(r->number, r->pixel, r->depth ^ ((n >> 20) << 24), range + (g << 20) + (n & 0xfffffu), r->seed);
 }
 
 /// Position (`point` 1) or direction (0) in root cells of the grid's table.

@@ -155,7 +155,7 @@ static spectrum lamp_light(const bool camera, float3 o, float3 d, uint phase, fl
     value *= divide_s(phase_value_s(next_phase, next_g, phase_versine(next_g, w, back)), lights[i].lamp_pdf);
     // To the place, then to the lamp, each with random numbers of its own.
     for (uint leg = 0; leg < 2u && value > 0.0f; ++leg) {
-        const Draws own = {r->sample, r->pixel, r->depth | (camera ? DRAWS_FROM_CAMERA : 0u) | (leg ? DRAWS_TO_LAMP : DRAWS_TO_PLACE), r->seed};
+        const Draws own = {r->number, r->pixel, r->depth | (camera ? DRAWS_FROM_CAMERA : 0u) | (leg ? DRAWS_TO_LAMP : DRAWS_TO_PLACE), r->seed};
         value *= transmittance_estimate(leg ? x : o, leg ? back : w, leg ? square * inverse_rest : t, leg ? draw_bits(&own, DRAW_LIGHT).w : more.w, &own, flight, SCENE);
     }
     return to_spectrum(lights[i].radiance) * albedo * value;

@@ -8,12 +8,12 @@
 
 /// Random numbers of one scattering event of each lane's sample, as Draws.
 typedef struct {
-    vuint sample, pixel, depth;
+    vuint number, pixel, depth;
     uint2 seed;
 } LaneDraws;
 
 static void lanes_bits(const LaneDraws* r, vuint draw, vuint* a, vuint* b, vuint* c, vuint* d) {
-    draw_v(r->sample, r->pixel, r->depth, draw, r->seed, a, b, c, d);
+    draw_v(r->number, r->pixel, r->depth, draw, r->seed, a, b, c, d);
 }
 
 static int lanes_count(vint mask) {
@@ -130,7 +130,7 @@ static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint*
     // Out of patience: the rest of their cells is left to cell_decompose.
     for (int i = 0; i < CLUME_WIDTH; ++i) {
         if (!LANE_OF(int, many, i)) continue;
-        const Draws own = {LANE_OF(uint, r->sample, i), LANE_OF(uint, r->pixel, i), LANE_OF(uint, r->depth, i), r->seed};
+        const Draws own = {LANE_OF(uint, r->number, i), LANE_OF(uint, r->pixel, i), LANE_OF(uint, r->depth, i), r->seed};
         const float end = min_s(LANE_OF(float, f->t_exit, i), LANE_OF(float, f->t_end, i));
         const float t = cell_decompose(LANE_OF(uint, f->reference, i), LANE_OF(uint, f->count, i), lane_origin(f, i), lane_direction(f, i), LANE_OF(float, f->t, i), end,
                                        draw_key(&own, LANE_OF(uint, f->draw, i) ^ DRAW_REST), (uint*)&f->primitive + i, references, primitives);

@@ -11,6 +11,7 @@
 
 typedef struct {
     LaneFlights flight;
+    vuint sample;
     LaneDraws draws;
     vfloat beta[CLUME_CHANNELS], radiance[CLUME_CHANNELS];
     vfloat phase_pdf;
@@ -49,6 +50,7 @@ static void lane_add(vfloat* radiance, int i, spectrum s) {
 static void lanes_start(Lanes* l, vint mask, __constant const RenderParams* params) {
     vuint a, b, c, d;
     LANE_SET(l->draws.depth, (vuint)0u, mask);
+    LANE_SET(l->draws.number, sample_number_v(l->sample), mask);
     lanes_bits(&l->draws, (vuint)DRAW_CAMERA, &a, &b, &c, &d);
     const vfloat fx = l->film_x + uniform_v(a), fy = l->film_y + uniform_v(d);
     LaneFlights* f = &l->flight;
@@ -211,7 +213,7 @@ static void lanes_collide(Lanes* l, vint mask, SCENE_ARGS) {
 #if CLUME_NEE
     for (int i = 0; i < CLUME_WIDTH; ++i) {
         if (!LANE_OF(int, lives, i)) continue;
-        const Draws r = {LANE_OF(uint, l->draws.sample, i), LANE_OF(uint, l->draws.pixel, i), LANE_OF(uint, l->draws.depth, i), l->draws.seed};
+        const Draws r = {LANE_OF(uint, l->draws.number, i), LANE_OF(uint, l->draws.pixel, i), LANE_OF(uint, l->draws.depth, i), l->draws.seed};
         LightSample s;
         spectrum value;
         uint word;

@@ -24,16 +24,16 @@
 #define group_extent_squared(g) media[group_medium[g]].extent_squared
 #endif
 
-/// Random numbers of one scattering event of one sample.
+/// Random numbers of one scattering event of one sample, known by its sample_number.
 typedef struct {
-    uint sample, pixel, depth;
+    uint number, pixel, depth;
     uint2 seed;
 } Draws;
 
-static uint4 draw_bits(const Draws* r, uint draw) { return draw_words(r->sample, r->pixel, r->depth, draw, r->seed); }
+static uint4 draw_bits(const Draws* r, uint draw) { return draw_words(r->number, r->pixel, r->depth, draw, r->seed); }
 
 /// A key for `primitive_bits`: independent words, whatever CLUME_SOBOL is.
-static uint2 draw_key(const Draws* r, uint draw) { return philox((uint4)(r->sample, r->pixel, r->depth, draw), r->seed).xy; }
+static uint2 draw_key(const Draws* r, uint draw) { return philox((uint4)(r->number, r->pixel, r->depth, draw), r->seed).xy; }
 
 #define FLIGHT_ESCAPED 0
 #define FLIGHT_COLLIDED 1

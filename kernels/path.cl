@@ -26,7 +26,7 @@ typedef struct {
 } Path;
 
 static void path_begin(Path* p, uint pixel, uint sample, __constant const RenderParams* params) {
-    const Draws r = {sample, pixel, 0, (uint2)(params->seed_lo, params->seed_hi)};
+    const Draws r = {sample_number_s(sample), pixel, 0, (uint2)(params->seed_lo, params->seed_hi)};
     const uint4 bits = draw_bits(&r, DRAW_CAMERA);
     camera_ray(params, pixel % params->film_width, pixel / params->film_width, uniform_s(bits.x), uniform_s(bits.w), &p->o, &p->d);
     p->phase_pdf = 0.0f;
@@ -110,7 +110,7 @@ static spectrum path_surface(uint surface, float3 o, float3 d, float t, float ph
 
 /// One event; afterwards the path is alive, paused in its flight (still alive), or ended with its radiance complete.
 static void path_event(Path* p, uint pixel, SCENE_ARGS) {
-    const Draws r = {p->sample, pixel, p->depth, (uint2)(params->seed_lo, params->seed_hi)};
+    const Draws r = {sample_number_s(p->sample), pixel, p->depth, (uint2)(params->seed_lo, params->seed_hi)};
     uint surface;
     const float t_end = surfaces_nearest(p->o, p->d, CLUME_INFINITY, NO_LIGHT, &surface, params, lights);
     const int result = flight_sample(p->o, p->d, t_end, &p->flight, &r, SCENE);

@@ -16,7 +16,7 @@ __kernel void probe_draw(__global const uint4* counter, uint2 seed, __global uin
         ((uint*)&c[2])[i] = mine.z;
         ((uint*)&c[3])[i] = mine.w;
     }
-    draw_v(c[0], c[1], c[2], c[3], seed, w, w + 1, w + 2, w + 3);
+    draw_v(sample_number_v(c[0]), c[1], c[2], c[3], seed, w, w + 1, w + 2, w + 3);
     for (uint i = 0; i < CLUME_WIDTH && first + i < count; ++i)
         out[first + i] = (uint4)(((const uint*)&w[0])[i], ((const uint*)&w[1])[i], ((const uint*)&w[2])[i], ((const uint*)&w[3])[i]);
 }
@@ -112,7 +112,7 @@ __kernel void probe_ray(SCENE_ARGS, __global const float4* rays, __global float4
     const float3 o = rays[2 * i].xyz, d = rays[2 * i + 1].xyz;
     const float t_end = rays[2 * i].w;
     float4 r = (float4)(CLUME_INFINITY, as_float(CLUME_NO_PRIMITIVE), 1.0f, 0.0f);
-    Draws draws = {sample, i, 1, (uint2)(params->seed_lo, params->seed_hi)};
+    Draws draws = {sample_number_s(sample), i, 1, (uint2)(params->seed_lo, params->seed_hi)};
     Flight f;
     flight_clear(&f);
     if ((what & 1u) && flight_to_end(o, d, t_end, &f, &draws, SCENE) == FLIGHT_COLLIDED) {
@@ -134,7 +134,7 @@ __kernel void probe_flights(SCENE_ARGS, __global const float4* rays, __global fl
     uint next = (uint)get_global_id(0) * each;
     if (next >= count) return;
     const uint last = min(next + each, count);
-    const LaneDraws draws = {(vuint)sample, (vuint)0u, (vuint)1u, (uint2)(params->seed_lo, params->seed_hi)};
+    const LaneDraws draws = {sample_number_v((vuint)sample), (vuint)0u, (vuint)1u, (uint2)(params->seed_lo, params->seed_hi)};
     LaneDraws r = draws;
     LaneFlights f;
     for (uint i = 0; i < sizeof(LaneFlights) / sizeof(uint); ++i) ((uint*)&f)[i] = 0;  // idle lanes are computed with, too

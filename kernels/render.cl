@@ -119,7 +119,7 @@ static bool rows_left(const Rows* rows, const Share* share) { return rows->fresh
 /// row of which most is left. Returns the lanes that got one.
 static vint lanes_assign(Lanes* l, Rows* rows, vint idle, const Share* share, __global const uint* pixels, __constant const RenderParams* params) {
     vint begun = idle & (rows->next < (vuint)share->sample_end);
-    LANE_SET(l->draws.sample, rows->next, begun);
+    LANE_SET(l->sample, rows->next, begun);
     LANE_SET(l->draws.pixel, rows->pixel, begun);
     LANE_SET(l->film_x, rows->x, begun);
     LANE_SET(l->film_y, rows->y, begun);
@@ -139,7 +139,7 @@ static vint lanes_assign(Lanes* l, Rows* rows, vint idle, const Share* share, __
         }
         if (LANE_OF(uint, rows->next, from) >= share->sample_end) continue;
         ((uint*)&l->row)[i] = LANE_OF(uint, rows->index, from);
-        ((uint*)&l->draws.sample)[i] = LANE_OF(uint, rows->next, from);
+        ((uint*)&l->sample)[i] = LANE_OF(uint, rows->next, from);
         ((uint*)&l->draws.pixel)[i] = LANE_OF(uint, rows->pixel, from);
         ((float*)&l->film_x)[i] = LANE_OF(float, rows->x, from);
         ((float*)&l->film_y)[i] = LANE_OF(float, rows->y, from);
@@ -162,7 +162,7 @@ static void lanes_resume(Lanes* l, uint i, __global const PathState* s) {
         ((float*)(l->beta + k))[i] = PARAM_CHANNEL(s->beta, k);
         ((float*)(l->radiance + k))[i] = PARAM_CHANNEL(s->radiance, k);
     }
-    ((uint*)&l->draws.sample)[i] = s->sample;
+    ((uint*)&l->sample)[i] = s->sample;
     ((uint*)&l->draws.depth)[i] = s->depth;
     ((uint*)&l->flight.draw)[i] = s->draw;
     ((uint*)&l->row)[i] = s->row;
@@ -176,7 +176,7 @@ static void lanes_save(const Lanes* l, const Rows* rows, uint i, __global PathSt
     s->direction = (float4)(lane_direction(f, i), LANE_OF(float, l->phase_pdf, i));
     s->beta = (float4)(LANE_OF(float, l->beta[0], i), LANE_OF(float, l->beta[CLUME_CHANNELS / 2], i), LANE_OF(float, l->beta[CLUME_CHANNELS - 1], i), 0.0f);
     s->radiance = (float4)(LANE_OF(float, l->radiance[0], i), LANE_OF(float, l->radiance[CLUME_CHANNELS / 2], i), LANE_OF(float, l->radiance[CLUME_CHANNELS - 1], i), 0.0f);
-    s->sample = LANE_OF(uint, l->draws.sample, i);
+    s->sample = LANE_OF(uint, l->sample, i);
     s->depth = LANE_OF(uint, l->draws.depth, i);
     s->draw = LANE_OF(uint, f->draw, i);
     s->flags = (LANE_OF(int, l->alive, i) ? PATH_ALIVE : 0u) | (LANE_OF(int, l->alpha, i) ? PATH_ALPHA : 0u);
@@ -212,6 +212,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
             rows_enter(&rows, i, i, first_sample(i, &share), &share, pixels, params);
         }
     }
+    l.draws.number = sample_number_v(l.sample);
     int events = 0;
     vint waiting = l.alive, out = (vint)0;  // paths about to fly; paths flying, or at the end of a flight
     for (;;) {

@@ -55,9 +55,9 @@ static void product_v(vuint x, uint factor, vuint* high, vuint* low) {
 #include "rng_body.inc.cl"
 #include "body_end.inc.cl"
 
-static uint4 draw_words(uint sample, uint pixel, uint depth, uint draw, uint2 seed) {
+static uint4 draw_words(uint number, uint pixel, uint depth, uint draw, uint2 seed) {
     uint x, y, z, w;
-    draw_s(sample, pixel, depth, draw, seed, &x, &y, &z, &w);
+    draw_s(number, pixel, depth, draw, seed, &x, &y, &z, &w);
     return (uint4)(x, y, z, w);
 }
 

@@ -57,12 +57,12 @@ static VU FN(sobol_second)(VU x) {
 /// The words of `philox` for (any sample, pixel, depth, draw) become those of this sample: *c0 with *c3 and *c1 with *c2 are the
 /// coordinates of a two-dimensional Sobol' sequence over the samples of a pixel, in an order of its own, shifted digitally. What is
 /// added to the words does not depend on them, so those of one sample are as random as `philox` makes them.
-static void FN(sobol)(VU sample, VU pixel, VU depth, VU draw, uint2 key, VU* c0, VU* c1, VU* c2, VU* c3) {
+static void FN(sobol)(VU number, VU pixel, VU depth, VU draw, uint2 key, VU* c0, VU* c1, VU* c2, VU* c3) {
     VU seed = (pixel * (VU)0x9E3779B9u) ^ (depth * (VU)0x85EBCA6Bu) ^ (draw * (VU)0xC2B2AE35u) ^ (VU)key.x;
     seed = (seed ^ (seed >> (VU)16)) * (VU)0x7FEB352Du + (VU)key.y;
     seed = (seed ^ (seed >> (VU)15)) * (VU)0x846CA68Bu;
     seed ^= seed >> (VU)16;
-    const VU number = FN(reverse)(sample), p = FN(nested)(number, seed), q = FN(nested)(number, seed * (VU)0x9E485565u + (VU)0x632BE59Bu);
+    const VU p = FN(nested)(number, seed), q = FN(nested)(number, seed * (VU)0x9E485565u + (VU)0x632BE59Bu);
     *c0 ^= p;
     *c3 ^= FN(sobol_second)(p);
     *c1 ^= q;
@@ -70,15 +70,24 @@ static void FN(sobol)(VU sample, VU pixel, VU depth, VU draw, uint2 key, VU* c0,
 }
 #endif
 
-/// The words of one draw: by `philox` alone, or (CLUME_SOBOL) spread evenly over a pixel's samples.
-static void FN(draw)(VU sample, VU pixel, VU depth, VU draw, uint2 seed, VU* c0, VU* c1, VU* c2, VU* c3) {
-    *c0 = CLUME_SOBOL ? (VU)0xffffffffu : sample;
+/// What `draw` needs to know of a sample.
+static VU FN(sample_number)(VU sample) {
+#if CLUME_SOBOL
+    return FN(reverse)(sample);
+#else
+    return sample;
+#endif
+}
+
+/// The words of one draw for a sample's number: by `philox` alone, or (CLUME_SOBOL) spread evenly over a pixel's samples.
+static void FN(draw)(VU number, VU pixel, VU depth, VU draw, uint2 seed, VU* c0, VU* c1, VU* c2, VU* c3) {
+    *c0 = CLUME_SOBOL ? (VU)0xffffffffu : number;
     *c1 = pixel;
     *c2 = depth;
     *c3 = draw;
     FN(philox)(c0, c1, c2, c3, seed);
 #if CLUME_SOBOL
-    FN(sobol)(sample, pixel, depth, draw, seed, c0, c1, c2, c3);
+    FN(sobol)(number, pixel, depth, draw, seed, c0, c1, c2, c3);
 #endif
 }
 

@@ -126,7 +126,8 @@ DeviceRenderer::Piece DeviceRenderer::render(std::size_t first, std::size_t coun
         states_ = Buffer<device::PathState>(queue_, items * lanes_);
         sums_ = Buffer<std::uint64_t>(queue_, rows * FILM_WORDS);
     }
-    sums_.upload(std::vector<std::uint64_t>(rows * FILM_WORDS));  // by the host: Oclgrind does not know buffers that kernels or fills have made
+    // Lanes add to their rows. By the host: Oclgrind does not know buffers that kernels or fills have made.
+    if (lanes_ > 1) sums_.upload(std::vector<std::uint64_t>(rows * FILM_WORDS));
     cl_uint resume = 0;
     for (;;) {
         const device::uint none = 0;
