@@ -80,8 +80,8 @@ struct Walk {
         make(true);
         const std::vector<float> counts = out.download();
         const double steps = std::accumulate(counts.begin(), counts.end(), 0.0) / static_cast<double>(counts.size());
-        cost = bvh ? Cost{steps * BVH_ARITY * (operations("node") + child_operations), steps * sizeof(device::BvhNode), steps, static_cast<double>(device.nodes.size() * sizeof(device::BvhNode))}
-                   : Cost{steps * cell_step_operations, steps * sizeof(device::CellEntry), steps, static_cast<double>(device.cells.size() * sizeof(device::CellEntry))};
+        cost = bvh ? Cost{(operations("node") + child_operations) * (steps * BVH_ARITY), steps * sizeof(device::BvhNode), steps, static_cast<double>(device.nodes.size() * sizeof(device::BvhNode))}
+                   : Cost{cell_step_operations * steps, steps * sizeof(device::CellEntry), steps, static_cast<double>(device.cells.size() * sizeof(device::CellEntry))};
         make(false);
     }
     double launch() { return program->queue.launch(kernel, rays.size(), 8); }
@@ -98,11 +98,11 @@ void add_accelerator_benchmarks(Session& session) {
     const double group_bytes = CLUME_GROUP_FLOATS * sizeof(float);
     add(session, "node", "node_tests", 1, 8192, 8, kNodes, static_cast<double>(kNodes * BVH_ARITY), {operations("node"), 24, 0, kNodes * sizeof(device::BvhNode)});
     // Half of the lanes are hit: so many at least are evaluated.
-    const double tests = operations("intersect_whitened"), draw = operations("primitive_bits") + operations("exponential");
+    const Operations tests = operations("intersect_whitened"), draw = operations("primitive_bits") + operations("exponential");
     for (const int width : kernel_widths(session)) {
-        const auto leaf = [&](const char* item, const char* kernel, double evaluation) {
+        const auto leaf = [&](const char* item, const char* kernel, const Operations& evaluation) {
             add(session, with_width(item, width), kernel, width, static_cast<int>(kLeaves * CLUME_GROUP_SIZE), 60, kLeaves, static_cast<double>(kLeaves * CLUME_GROUP_SIZE),
-                {tests + 0.5 * evaluation, 44, 0, static_cast<double>(kLeaves) * group_bytes});
+                {tests + evaluation * 0.5, 44, 0, static_cast<double>(kLeaves) * group_bytes});
         };
         leaf("leaf/flight", "leaf_decompose", draw + operations("inverse/gaussian"));
         leaf("leaf/depth", "leaf_depth", operations("depth/gaussian"));

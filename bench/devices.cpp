@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Devices that share a render: paths per second of each alone and of all together, in turns. Halves of one CPU device; halves of
-// the CPU devices of two implementations; and every CPU device beside every GPU. Of two implementations each half is measured
-// alone on half of the cores: Intel's does not keep a sub-device's threads to its own while the others are free.
+// the CPU devices of two implementations; and every CPU device beside every GPU. Halves are measured alone on half of the cores:
+// Intel's runtime does not keep a sub-device's threads to its own while the others are free.
 #include <fmt/format.h>
 #include <sched.h>
 
@@ -22,8 +22,6 @@
 namespace clume::bench {
 namespace {
 
-constexpr const char* kTwoImplementations = "two_implementations";
-
 struct Shared {
     std::string item;
     std::vector<DeviceInfo> devices;
@@ -39,7 +37,7 @@ std::vector<Shared> pairs_of(const DeviceInfo& own) {
     if (own.type == "cpu" && own.compute_units > 1) out.push_back({"cpu_split_2", split_cpu(own, 2)});
     for (std::size_t a = 0; a < cpus.size(); ++a)
         for (std::size_t b = a + 1; b < cpus.size(); ++b)
-            if (cpus[a].platform != cpus[b].platform) out.push_back({kTwoImplementations, {split_cpu(cpus[a], 2)[0], split_cpu(cpus[b], 2)[1]}});
+            if (cpus[a].platform != cpus[b].platform) out.push_back({"two_implementations", {split_cpu(cpus[a], 2)[0], split_cpu(cpus[b], 2)[1]}});
     for (const DeviceInfo& c : cpus)
         for (const DeviceInfo& g : gpus) out.push_back({"cpu_and_gpu", {c, g}});
     return out;
@@ -91,10 +89,10 @@ void measure(Session& session, const Shared& shared) {
         return static_cast<double>(pixels.size()) * samples / report.elapsed_s;
     };
     // Of the device k alone, on its share of the cores.
-    const bool confine = shared.item == kTwoImplementations;
+    const bool halves = std::ranges::all_of(shared.devices, [](const DeviceInfo& d) { return d.type == "cpu"; });
     const auto speed_alone = [&](std::size_t k, std::uint32_t count) {
         std::optional<Confined> confined;
-        if (confine) confined.emplace(k == 0 ? 0 : shared.devices[0].compute_units, shared.devices[k].compute_units);
+        if (halves) confined.emplace(k == 0 ? 0 : shared.devices[0].compute_units, shared.devices[k].compute_units);
         return speed({all[k]}, count);
     };
     // As many samples as make a turn long beside a batch.

@@ -96,8 +96,8 @@ void add_group_benchmarks(Session& session) {
                     const auto& groups = work.what == GroupWork::intersect_quadratic ? d->second.quadratic : d->second.groups;
                     const auto run = p->second.group_work(work.what, d->second.rays, groups, family.bit, d->second.e2);
                     const bool chord = work.what != GroupWork::density;
-                    const double own = work.by_family ? operations(name) : 0;
-                    const double intersection = chord ? operations(work.what == GroupWork::intersect_quadratic ? "intersect_quadratic" : "intersect_whitened") : 0;
+                    const Operations own = work.by_family ? operations(name) : Operations{};
+                    const Operations intersection = chord ? operations(work.what == GroupWork::intersect_quadratic ? "intersect_quadratic" : "intersect_whitened") : Operations{};
                     return Launch{static_cast<double>(kRays * kGroups * CLUME_GROUP_SIZE), run.device_s, {own + intersection, work.bytes, 0, static_cast<double>(groups.size() * sizeof(float))}};
                 });
             }
@@ -109,7 +109,7 @@ void add_group_benchmarks(Session& session) {
                 static auto& lines = *new std::map<int, ProxyLines>;  // never destroyed: the implementation may be gone by then
                 ProxyLines& l = lines.try_emplace(width, session.device(), width, 60).first->second;
                 const double s = l.launch(what);
-                return Launch{l.tests(), s, {operations(block) + 0.5 * operations("intersect_whitened"), what == ProxyWork::mesh ? 36.0 * 4 : 40, 0, l.byte_size(what)}};
+                return Launch{l.tests(), s, {operations(block) + operations("intersect_whitened") * 0.5, what == ProxyWork::mesh ? 36.0 * 4 : 40, 0, l.byte_size(what)}};
             });
 }
 

@@ -53,8 +53,8 @@ private:
         std::string line = fmt::format("{:44} {:10.3f} {:9.3f} {:9.3f}", name, rate, low, highest * 1e-6);
         // The peaks are the highest rates of single launches, too.
         if (const auto share = share_of(cost, highest, peaks(session_))) {
-            line += fmt::format(" {:8.0f} {:7.0f} {:7.1f} {:6.1f} % {}", cost.operations, cost.bytes, cost.gathers, 100 * share->value, share->limit);
-            fields.insert(fields.end(), {{"operations", cost.operations}, {"bytes", cost.bytes}, {"gathers", cost.gathers}, {"footprint", cost.footprint}, {"share", share->value}, {"limit", share->limit}});
+            line += fmt::format(" {:8.0f} {:7.0f} {:7.1f} {:6.1f} % {}", cost.operations.all, cost.bytes, cost.gathers, 100 * share->value, share->limit);
+            fields.insert(fields.end(), {{"operations", cost.operations.all}, {"multiplications", cost.operations.multiplications}, {"bytes", cost.bytes}, {"gathers", cost.gathers}, {"footprint", cost.footprint}, {"share", share->value}, {"limit", share->limit}});
         }
         session_.record(name, line, std::move(fields));
     }

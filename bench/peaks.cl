@@ -1,23 +1,26 @@
 // SPDX-License-Identifier: MIT
-// What a device can do at most: fused multiply-adds in vectors of CLUME_WIDTH, reading in order, reading lines at random, and
+// What a device can do at most: fused multiply-adds in vectors of CLUME_WIDTH, alone and among additions, reading in order, reading lines at random, and
 // a launch that does nothing. Every result depends on all the work, so none of it can be left out.
 #include "lanes.cl"
 
-/// Sixteen independent chains of fma, 16 · rounds · CLUME_WIDTH of them in all.
-__kernel void peak_fma(__global float* out, uint count, uint rounds, float a, float b) {
-    const uint i = (uint)get_global_id(0);
-    if (i >= count) return;
-    const vfloat va = (vfloat)a, vb = (vfloat)b;
-    vfloat x0 = (vfloat)(float)i, x1 = x0 + 1.0f, x2 = x0 + 2.0f, x3 = x0 + 3.0f, x4 = x0 + 4.0f, x5 = x0 + 5.0f, x6 = x0 + 6.0f, x7 = x0 + 7.0f;
-    vfloat x8 = x0 + 8.0f, x9 = x0 + 9.0f, xa = x0 + 10.0f, xb = x0 + 11.0f, xc = x0 + 12.0f, xd = x0 + 13.0f, xe = x0 + 14.0f, xf = x0 + 15.0f;
-    for (uint round = 0; round < rounds; ++round) {
-        x0 = fma(x0, va, vb), x1 = fma(x1, va, vb), x2 = fma(x2, va, vb), x3 = fma(x3, va, vb);
-        x4 = fma(x4, va, vb), x5 = fma(x5, va, vb), x6 = fma(x6, va, vb), x7 = fma(x7, va, vb);
-        x8 = fma(x8, va, vb), x9 = fma(x9, va, vb), xa = fma(xa, va, vb), xb = fma(xb, va, vb);
-        xc = fma(xc, va, vb), xd = fma(xd, va, vb), xe = fma(xe, va, vb), xf = fma(xf, va, vb);
-    }
+// Sixteen independent chains of operations, 16 · rounds · CLUME_WIDTH of them in all: EVEN and ODD of x are done in turns.
+#define CHAINS(EVEN, ODD)                                                                                                                              \
+    const uint i = (uint)get_global_id(0);                                                                                                             \
+    if (i >= count) return;                                                                                                                            \
+    const vfloat va = (vfloat)a, vb = (vfloat)b;                                                                                                       \
+    vfloat x0 = (vfloat)(float)i, x1 = x0 + 1.0f, x2 = x0 + 2.0f, x3 = x0 + 3.0f, x4 = x0 + 4.0f, x5 = x0 + 5.0f, x6 = x0 + 6.0f, x7 = x0 + 7.0f;      \
+    vfloat x8 = x0 + 8.0f, x9 = x0 + 9.0f, xa = x0 + 10.0f, xb = x0 + 11.0f, xc = x0 + 12.0f, xd = x0 + 13.0f, xe = x0 + 14.0f, xf = x0 + 15.0f;       \
+    for (uint round = 0; round < rounds; ++round) {                                                                                                    \
+        x0 = EVEN(x0), x1 = ODD(x1), x2 = EVEN(x2), x3 = ODD(x3), x4 = EVEN(x4), x5 = ODD(x5), x6 = EVEN(x6), x7 = ODD(x7);                            \
+        x8 = EVEN(x8), x9 = ODD(x9), xa = EVEN(xa), xb = ODD(xb), xc = EVEN(xc), xd = ODD(xd), xe = EVEN(xe), xf = ODD(xf);                            \
+    }                                                                                                                                                  \
     out[i] = lanes_sum(((x0 + x1) + (x2 + x3)) + ((x4 + x5) + (x6 + x7)) + (((x8 + x9) + (xa + xb)) + ((xc + xd) + (xe + xf))));
-}
+#define FMA(x) fma(x, va, vb)
+#define ADD(x) ((x) + vb)
+
+__kernel void peak_fma(__global float* out, uint count, uint rounds, float a, float b) { CHAINS(FMA, FMA) }
+
+__kernel void peak_fma_add(__global float* out, uint count, uint rounds, float a, float b) { CHAINS(FMA, ADD) }
 
 #ifndef PEAK_INTERLEAVED  // 1: neighbours read neighbours, as GPUs like it; 0: a work-item reads a stretch of its own
 #define PEAK_INTERLEAVED 0

@@ -59,10 +59,10 @@ double best_rate(Session& session, const SizedLaunch& launch, double per_item, c
     return best;
 }
 
-double fma_rate(Session& session, int width) {
+double fma_rate(Session& session, int width, bool with_additions) {
     constexpr cl_uint rounds = 1024;
     Program p(session, width);
-    cl::Kernel kernel = make_kernel(p.queue, p.program, "peak_fma");
+    cl::Kernel kernel = make_kernel(p.queue, p.program, with_additions ? "peak_fma_add" : "peak_fma");
     const SizedLaunch launch(session, p.queue, kernel, [&](std::size_t items, Buffer<float>& out) { set_args(p.queue, kernel, 0, out, cl_uint(items), rounds, 0.999f, 0.001f); }, kShort);
     return best_rate(session, launch, 16.0 * rounds * width);
 }
@@ -105,7 +105,9 @@ double launch_latency(Session& session) {
 
 }  // namespace
 
-double Peaks::operations_s() const { return *std::max_element(fma_s.begin(), fma_s.end()); }
+double Peaks::multiplications_s() const { return *std::ranges::max_element(fma_s); }
+
+double Peaks::operations_s() const { return std::max(multiplications_s(), *std::ranges::max_element(fma_add_s)); }
 
 PeakLevel Peaks::level(double footprint) const {
     for (std::size_t k = 0; k < levels.size(); ++k) {
@@ -126,7 +128,10 @@ const Peaks& peaks(Session& session) {
     static std::optional<Peaks> measured;
     if (measured) return *measured;
     Peaks& p = measured.emplace();
-    for (std::size_t k = 0; k < p.fma_s.size(); ++k) p.fma_s[k] = fma_rate(session, cases::vector_widths[k]);
+    for (std::size_t k = 0; k < p.fma_s.size(); ++k) {
+        p.fma_s[k] = fma_rate(session, cases::vector_widths[k], false);
+        p.fma_add_s[k] = fma_rate(session, cases::vector_widths[k], true);
+    }
     p.levels = working_sets();
     for (PeakLevel& level : p.levels) read_rates(session, level);
     p.launch_s = launch_latency(session);
@@ -135,7 +140,8 @@ const Peaks& peaks(Session& session) {
 
 std::optional<Share> share_of(const Cost& cost, double items_s, const Peaks& peaks) {
     const PeakLevel level = peaks.level(cost.footprint);
-    const std::pair<double, std::string> shares[] = {{cost.operations * items_s / peaks.operations_s(), "operations"},
+    const std::pair<double, std::string> shares[] = {{cost.operations.all * items_s / peaks.operations_s(), "operations"},
+                                                     {cost.operations.multiplications * items_s / peaks.multiplications_s(), "multiplications"},
                                                      {cost.bytes * items_s / level.bytes_s, fmt::format("bytes in {}", level.name)},
                                                      {cost.gathers * items_s / level.gathers_s, fmt::format("gathers in {}", level.name)}};
     const auto& [value, limit] = *std::max_element(std::begin(shares), std::end(shares));
@@ -150,8 +156,11 @@ void bench_peaks_section(Session& session) {
         const double per_s = value();
         session.record(item, fmt::format("{:24} {:12.3f} {}", item, per_s * 1e-9, what), {{"per_s", per_s}});
     };
-    for (std::size_t k = 0; k < cases::vector_widths.size(); ++k)
-        rate(fmt::format("fma/w{}", cases::vector_widths[k]), [&] { return peaks(session).fma_s[k]; }, fmt::format("fma by vectors of {}", cases::vector_widths[k]));
+    for (std::size_t k = 0; k < cases::vector_widths.size(); ++k) {
+        const int width = cases::vector_widths[k];
+        rate(fmt::format("fma/w{}", width), [&] { return peaks(session).fma_s[k]; }, fmt::format("fma by vectors of {}", width));
+        rate(fmt::format("fma_add/w{}", width), [&] { return peaks(session).fma_add_s[k]; }, fmt::format("fma and additions in turns by vectors of {}", width));
+    }
     const std::vector<PeakLevel> sets = working_sets();
     for (std::size_t k = 0; k < sets.size(); ++k) {
         const std::string where = session.options().list ? "" : cache_of(session.device(), sets[k].byte_size);

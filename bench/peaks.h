@@ -8,14 +8,16 @@
 #include <string>
 #include <vector>
 
+#include "bench/operations.h"
 #include "bench/session.h"
 
 namespace clume::bench {
 
 /// What one item of a kernel takes. An operation is one lane's fma, addition, multiplication, comparison, selection,
-/// conversion or integer instruction: each takes the slot of one fma. A gather is a place that nothing before it tells.
+/// conversion or integer instruction. A gather is a place that nothing before it tells.
 struct Cost {
-    double operations = 0, bytes = 0, gathers = 0;
+    Operations operations;
+    double bytes = 0, gathers = 0;
     double footprint = 0;  ///< bytes among which those lie
 };
 
@@ -27,10 +29,11 @@ struct PeakLevel {
 };
 
 struct Peaks {
-    std::array<double, 4> fma_s{};  ///< by vectors of kernel_widths
+    std::array<double, 4> fma_s{}, fma_add_s{};  ///< by vectors of kernel_widths: fma alone, as many additions among them
     std::vector<PeakLevel> levels;  ///< ascending
     double launch_s = 0;            ///< of nothing: from the call until its end is known
-    double operations_s() const;    ///< the most of fma_s
+    double multiplications_s() const;  ///< the most of fma_s
+    double operations_s() const;       ///< the most of all
     /// Between the sizes measured, a power of the footprint; the name is that of the larger one.
     PeakLevel level(double footprint) const;
 };

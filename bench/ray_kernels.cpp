@@ -108,10 +108,10 @@ Cost count(Session& session, const Field& f, const std::vector<ProbeRay>& all, c
 
     Cost cost;
     const DeviceScene& d = f.device;
-    const double own[] = {operations("intersect_whitened"), operations("density/" + f.family), operations("depth/" + f.family), operations("inverse/" + f.family), operations("depth/" + f.family), operations("exp")};
-    for (std::size_t k = 0; k < tallies; ++k) cost.operations += evaluated[k] * own[k];
-    cost.operations += n[WORK_CELLS] * cell_step_operations + n[WORK_NODES] * BVH_ARITY * (operations("node") + child_operations) + n[WORK_DRAWS] * operations("philox") +
-                       n[WORK_PRIMITIVES] * (operations("kernel/" + f.family) + operations("uniform") + operations("exponential") + tentative_operations);
+    const Operations own[] = {operations("intersect_whitened"), operations("density/" + f.family), operations("depth/" + f.family), operations("inverse/" + f.family), operations("depth/" + f.family), operations("exp")};
+    for (std::size_t k = 0; k < tallies; ++k) cost.operations = cost.operations + own[k] * evaluated[k];
+    cost.operations = cost.operations + cell_step_operations * n[WORK_CELLS] + (operations("node") + child_operations) * (n[WORK_NODES] * BVH_ARITY) + operations("philox") * n[WORK_DRAWS] +
+                      (operations("kernel/" + f.family) + operations("uniform") + operations("exponential") + tentative_operations) * n[WORK_PRIMITIVES];
     // Of a group 10 of its 11 rows are read, of a cell also the description of its leaf where densities are looked up.
     cost.bytes = n[WORK_CELLS] * sizeof(device::CellEntry) + n[WORK_NODES] * sizeof(device::BvhNode) + n[WORK_GROUPS] * 10 * CLUME_GROUP_SIZE * sizeof(float) +
                  n[WORK_DENSITIES] * sizeof(device::CellLeaf) + n[WORK_PRIMITIVES] * (sizeof(device::Reference) + sizeof(device::Primitive));

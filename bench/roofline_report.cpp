@@ -78,7 +78,7 @@ void write_roofline(Session& session, const std::filesystem::path& docs) {
     for (const Result& r : session.results())
         if (r.section == "peaks") peaks.push_back({r.item, r.item == "launch" ? fmt::format("{:.1f} µs", 1e6 * number(r.fields, "seconds")) : fmt::format("{:.3g} G", 1e-9 * number(r.fields, "per_s"))});
     report.table("peaks", peaks);
-    Table csv{{"item", "mitems_s", "lowest", "highest", "operations", "bytes", "gathers", "footprint", "share", "limit"}};
+    Table csv{{"item", "mitems_s", "lowest", "highest", "operations", "multiplications", "bytes", "gathers", "footprint", "share", "limit"}};
     for (const Result& r : session.results()) {
         if (r.section != "kernels") continue;
         std::vector<std::string>& row = csv.emplace_back(1, r.item);

@@ -43,11 +43,11 @@ struct Sort {
 };
 
 /// Operations per event: of a network's comparisons; or of an insertion's, 5 for each place that it goes back, (n − 1) / 4 on average.
-double sort_operations(const std::string& name, double n) {
+Operations sort_operations(const std::string& name, double n) {
     const double p = std::log2(n);
-    if (name == "insertion") return 5 * (n - 1) / 4;
+    if (name == "insertion") return {5 * (n - 1) / 4, 0};
     const double exchanges = name == "bitonic" ? n * p * (p + 1) / 4 : (p * p - p + 4) * n / 4 - 1;
-    return exchanges / n * operations("compare_exchange");
+    return operations("compare_exchange") * (exchanges / n);
 }
 
 /// The segments of one ball's rays.
@@ -71,7 +71,7 @@ struct Segments {
     }
     double launch() { return program->queue.launch(kernel, rays.size(), 8); }
     /// Per segment: each sixteen of its chords summed, every chord looked at for the first end and for having ended.
-    Cost cost() const { return {(16 * sums * (operations("depth/gaussian") + 1) + 3 * active) / segments, (16 * sums * 32 + 4 * active) / segments, 0, sizeof(float) * 256 * 9.0}; }
+    Cost cost() const { return {(operations("depth/gaussian") + Operations{1, 0}) * (16 * sums / segments) + Operations{3 * active / segments, 0}, (16 * sums * 32 + 4 * active) / segments, 0, sizeof(float) * 256 * 9.0}; }
 
     static constexpr std::size_t kRounds = 16;
     std::unique_ptr<SceneProgram> program;
