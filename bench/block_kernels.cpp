@@ -44,12 +44,12 @@ struct Ready {
     Ready(SceneProgram& p, const std::string& name) : program(p), kernel(p.kernel(name.c_str())) {}
 };
 
-/// The program with everything in it, of one width; never destroyed: the implementation may be gone by then.
-SceneProgram& general_program(Session& session, int width) {
-    static auto& all = *new std::map<int, SceneProgram>;
+/// The program with everything in it, of one width and sampler; never destroyed: the implementation may be gone by then.
+SceneProgram& general_program(Session& session, int width, bool sobol = false) {
+    static auto& all = *new std::map<std::pair<int, bool>, SceneProgram>;
     ProgramOptions options;
-    options.define("CLUME_WIDTH", width);
-    return all.try_emplace(width, session, "roofline.cl", DeviceScene{}, options).first->second;
+    options.define("CLUME_WIDTH", width).define("CLUME_SOBOL", sobol);
+    return all.try_emplace({width, sobol}, session, "roofline.cl", DeviceScene{}, options).first->second;
 }
 
 using Make = std::function<std::unique_ptr<Ready>()>;
@@ -109,18 +109,21 @@ void add_math(Session& session) {
 }
 
 void add_random(Session& session) {
-    const auto make = [&session](const char* kernel, int width) {
+    const auto make = [&session](const char* kernel, int width, bool sobol = false) {
         return [=, &session] {
-            auto r = std::make_unique<Ready>(general_program(session, width), kernel);
+            auto r = std::make_unique<Ready>(general_program(session, width, sobol), kernel);
             r->launch = std::make_unique<SizedLaunch>(session, r->program.queue, r->kernel, [&r = *r](std::size_t count, Buffer<float>& out) {
                 set_args(r.program.queue, r.kernel, 0, out, cl_uint(count), cl_uint(kInputs));
             });
             return r;
         };
     };
-    add(session, "random/philox", make("random_philox", 1), static_cast<double>(kInputs), {operations("philox")});
-    for (const int width : kernel_widths(session))
-        add(session, with_width("random/primitive_bits", width), make("random_primitive_bits", width), static_cast<double>(kInputs) * width, {operations("primitive_bits")});
+    for (const int width : kernel_widths(session)) {
+        const double n = static_cast<double>(kInputs) * width;
+        add(session, with_width("random/philox", width), make("random_draw", width), n, {operations("philox")});
+        add(session, with_width("random/sobol", width), make("random_draw", width, true), n, {operations("philox") + operations("sobol")});
+        add(session, with_width("random/primitive_bits", width), make("random_primitive_bits", width), n, {operations("primitive_bits")});
+    }
 }
 
 /// A kernel over the vectors given, whose first arguments are a scene lit by one light of the kind: under the program that knows

@@ -89,21 +89,29 @@ MATH_S(acos, acos_s(x), acos(x))
 MATH_S(atan2, atan2_s(x, y), atan2(x, y))
 MATH_S(normalize, normalize_s((float3)(x, y, y)).x, normalize((float3)(x, y, y)).x)
 
-/// Blocks of four random words.
-__kernel void random_philox(__global float* out, uint count, uint rounds) {
+/// Draws of four random words by CLUME_WIDTH paths at a time.
+__kernel void random_draw(__global float* out, uint count, uint rounds) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
-    uint4 sum = (uint4)0u;
-    for (uint k = 0; k < rounds; ++k) sum ^= philox((uint4)(k, i, 1u, 2u), (uint2)(3u, 5u));
-    out[i] = (float)(sum.x ^ sum.y ^ sum.z ^ sum.w);
+    vuint pixel, sum = (vuint)0u;
+    for (int lane = 0; lane < CLUME_WIDTH; ++lane) ((uint*)&pixel)[lane] = i * CLUME_WIDTH + (uint)lane;
+    for (uint k = 0; k < rounds; ++k) {
+        vuint x, y, z, w;
+        draw_v(pixel + (vuint)k, pixel, pixel >> (vuint)1u, (vuint)k, (uint2)(3u, 5u), &x, &y, &z, &w);
+        sum += x ^ y ^ z ^ w;
+    }
+    uint total = 0;
+    for (int lane = 0; lane < CLUME_WIDTH; ++lane) total ^= ((const uint*)&sum)[lane];
+    out[i] = (float)total;
 }
 
 /// Words of CLUME_WIDTH primitives at a time.
 __kernel void random_primitive_bits(__global float* out, uint count, uint rounds) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
-    vuint sum = (vuint)0u;
-    for (uint k = 0; k < rounds; ++k) sum ^= primitive_bits((vuint)(k * CLUME_WIDTH) + sum, (uint2)(i, 5u));
+    vuint id, sum = (vuint)0u;
+    for (int lane = 0; lane < CLUME_WIDTH; ++lane) ((uint*)&id)[lane] = (uint)lane;
+    for (uint k = 0; k < rounds; ++k) sum += primitive_bits(id + (vuint)(k * CLUME_WIDTH), (uint2)(i, 5u));
     uint total = 0;
     for (int lane = 0; lane < CLUME_WIDTH; ++lane) total ^= ((const uint*)&sum)[lane];
     out[i] = (float)total;

@@ -87,8 +87,8 @@ void write_roofline(Session& session, const std::filesystem::path& docs) {
     }
     report.csv("roofline", csv);
     const Kind kinds[] = {{"primitives", {"intersect/", "density/", "depth/", "inverse/", "leaf/", "segments"}, true},
-                          {"blocks", {"node", "walk/", "sort/", "random/philox", "phase/", "light/", "environment/", "film/", "transfer/"}, false},
-                          {"functions", {"math/", "random/primitive_bits"}, true},
+                          {"blocks", {"node", "walk/", "sort/", "phase/", "light/", "environment/", "film/", "transfer/"}, false},
+                          {"functions", {"math/", "random/"}, true},
                           {"flights", {"flight/"}, true},
                           {"transmittances", {"transmittance/"}, true}};
     for (const Kind& kind : kinds) report.table(kind.table, table_of(session.results(), kind));

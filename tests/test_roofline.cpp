@@ -218,7 +218,7 @@ TEST_CASE("Roofline.EveryKernelIsListed", "[quick]") {
         for (const char* how : {"whitened", "quadratic", "icosphere_mesh", "icosphere_shared"}) listed(std::string("kernels/intersect/") + how + w);
         for (const cases::FamilyCase& f : cases::families)
             for (const char* what : {"density", "depth", "inverse"}) listed(std::string("kernels/") + what + "/" + f.name + w);
-        for (const char* item : {"leaf/flight", "leaf/depth", "segments", "random/primitive_bits"}) listed(std::string("kernels/") + item + w);
+        for (const char* item : {"leaf/flight", "leaf/depth", "segments", "random/philox", "random/sobol", "random/primitive_bits"}) listed(std::string("kernels/") + item + w);
         for (const char* from : {"coherent", "incoherent", "inside"}) {
             for (const char* strategy : {"delta", "decomposition_cells", "decomposition_bvh", "regular", "march"}) listed(std::string("kernels/flight/ball/") + strategy + "/" + from + w);
             for (const char* estimator : {"analytic_cells", "analytic_bvh", "march"}) listed(std::string("kernels/transmittance/ball/") + estimator + "/" + from + w);
@@ -230,7 +230,7 @@ TEST_CASE("Roofline.EveryKernelIsListed", "[quick]") {
     for (const cases::MathCase& f : cases::math_functions) CHECK(any(std::string("^kernels/math/") + f.name + "/own"));
     for (const char* level : {"32KiB", "1MiB", "32MiB", "512MiB"})
         for (const char* what : {"read", "gather"}) listed(std::string("peaks/") + what + "/" + level);
-    for (const char* item : {"peaks/launch", "kernels/node", "kernels/random/philox", "kernels/phase/sample/rayleigh", "kernels/phase/value/henyey_greenstein", "kernels/light/envmap",
+    for (const char* item : {"peaks/launch", "kernels/node", "kernels/phase/sample/rayleigh", "kernels/phase/value/henyey_greenstein", "kernels/light/envmap",
                              "kernels/environment/envmap", "kernels/film/sample", "kernels/transfer/to_device", "kernels/transfer/from_device", "kernels/walk/ball/bvh/inside"})
         listed(item);
     for (const char* sort : {"bitonic", "odd_even", "insertion"})
@@ -242,8 +242,8 @@ TEST_CASE("Roofline.WritesSharesOfWhatTheDeviceCanDo") {
     const SceneFolder folder;
     const std::string width = std::to_string(test_device().native_vector_width);
     // One of each kind, at the width that the device likes.
-    const std::string filter = "^peaks/|/(intersect/whitened|density/gaussian|depth/epanechnikov|inverse/uniform|leaf/depth|segments|flight/close/decomposition_bvh/inside|flight/close/delta/incoherent|transmittance/close/analytic_cells/coherent|math/exp/own)/w" +
-                               width + "$|/(math/asin/(own|built_in)|random/philox|phase/sample/rayleigh|light/sphere|environment/envmap|film/sample|sort/bitonic/64|sort/insertion/8|node|walk/close/bvh/inside|transfer/to_device)$";
+    const std::string filter = "^peaks/|/(intersect/whitened|density/gaussian|depth/epanechnikov|inverse/uniform|leaf/depth|segments|flight/close/decomposition_bvh/inside|flight/close/delta/incoherent|transmittance/close/analytic_cells/coherent|math/exp/own|random/philox)/w" +
+                               width + "$|/(math/asin/(own|built_in)|phase/sample/rayleigh|light/sphere|environment/envmap|film/sample|sort/bitonic/64|sort/insertion/8|node|walk/close/bvh/inside|transfer/to_device)$";
     Process run({"bench", "--roofline", "--quick", "--filter", filter, "--json", "speed.json"}, folder.path);
     const int code = run.wait(900);  // a dozen programs to compile
     INFO(run.out << run.err);
@@ -273,7 +273,7 @@ TEST_CASE("Roofline.WritesSharesOfWhatTheDeviceCanDo") {
         CHECK(r["share"].GetDouble() < 1.2);
         CHECK(r["operations"].GetDouble() + r["bytes"].GetDouble() > 0);
     }
-    CHECK(results.size() == 17 + 10 + 12);
+    CHECK(results.size() == 17 + 11 + 11);
     // What the peaks must have in common with any device.
     const auto peak = [&](const std::string& name) { return (*results.at("peaks/" + name))["per_s"].GetDouble(); };
     CHECK(peak("read/32KiB") > 0.5 * peak("read/512MiB"));
