@@ -24,7 +24,7 @@ constexpr std::uint32_t kPixels = 1024;     ///< at most
 constexpr std::uint32_t kSamples = 16;      ///< of each
 constexpr std::uint32_t kFirstSample = 0xc0000000u;  ///< numbers of their own: the image's noise is not what was chosen by
 constexpr std::size_t kFewPrimitives = 64;  ///< up to which one bound for the whole scene may be the cheapest
-constexpr int kVersion = 6;                 ///< of the candidates and of how they are measured
+constexpr int kVersion = 7;                 ///< of the candidates and of how they are measured
 
 std::size_t primitive_count(const Scene& scene) {
     std::size_t count = 0;
@@ -52,12 +52,9 @@ std::size_t best_of(const std::vector<PilotRow>& rows) {
     return best;
 }
 
-/// A row for the pair, after those that there are. `pixels` becomes the number rendered. What is given up follows from counted work
-/// alone, so it is the same on any device and in batches of any size.
-PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const Until& until, const std::vector<PilotRow>& others, std::uint32_t& pixels) {
-    double most_ns = std::numeric_limits<double>::infinity();  // of a path
-    for (const PilotRow& r : others)
-        if (r.measured()) most_ns = std::min(most_ns, pilot_patience * r.work_ns);
+/// A row for the pair by so many samples a pixel, given up above `most_ns` of work per path. `pixels` becomes the number rendered.
+/// What is given up follows from counted work alone, so it is the same on any device and in batches of any size.
+PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const Until& until, double most_ns, std::uint32_t samples, std::uint32_t& pixels) {
     PilotRow row;
     row.pair = pair;
     try {
@@ -66,19 +63,22 @@ PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodP
         o.crop.reset();
         o.noise_threshold.reset();
         o.most_pixels = kPixels;
-        if (std::isfinite(most_ns)) o.most_work_ns = most_ns * kSamples * pixels;
+        if (std::isfinite(most_ns)) o.most_work_ns = most_ns * samples * pixels;
         Renderer renderer(with_pair(scene, pair), o);
         Accumulation film = renderer.start(scene.render.seed, kFirstSample);
         pixels = renderer.rendered_pixels();
-        renderer.extend(film, kFirstSample + kSamples, {{}, &until.stop, until.left_s()});
-        if (pixels == 0 || until.over()) return row;
-        const RenderResult r = renderer.result(film);
-        for (std::size_t k = 0; k < WORK_KINDS; ++k) row.work_ns += work_weights_ns[k] * static_cast<double>(r.stats.work[k]);
-        for (const float v : r.image.variance) row.variance += static_cast<double>(v);
-        const double paths = static_cast<double>(pixels) * kSamples;
-        row.work_ns /= paths;
-        row.too_slow = row.work_ns > most_ns;
-        row.variance *= kSamples / (3.0 * static_cast<double>(pixels));
+        // Step by step: most of what is too slow shows by its first samples.
+        for (std::uint32_t done = 1; !row.too_slow; done = std::min(4 * done, samples)) {
+            renderer.extend(film, kFirstSample + done, {{}, &until.stop, until.left_s()});
+            if (pixels == 0 || until.over()) return row;
+            const RenderResult r = renderer.result(film);
+            row.work_ns = row.variance = 0;
+            for (std::size_t k = 0; k < WORK_KINDS; ++k) row.work_ns += work_weights_ns[k] * static_cast<double>(r.stats.work[k]) / (static_cast<double>(pixels) * done);
+            row.too_slow = row.work_ns > most_ns;
+            if (done < samples) continue;
+            for (const float v : r.image.variance) row.variance += static_cast<double>(v) * samples / (3.0 * static_cast<double>(pixels));
+            break;
+        }
     } catch (const TooMuchWork&) {
         row.too_slow = true;
     } catch (const RenderError& e) {
@@ -106,12 +106,21 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const Until&
                 candidates.push_back({s.name, estimator, bound});
             }
     }
-    // Null collisions may take for ever in dense or flat media: the others come first.
-    std::stable_partition(candidates.begin(), candidates.end(), [](const MethodPair& pair) { return !find_strategy(pair.strategy)->null_collisions; });
+    // Null collisions are most often the fastest, and come first; but they may take for ever in dense or flat media: a sample a pixel
+    // of a strategy without tells when to give them up.
+    const auto bounded = std::stable_partition(candidates.begin(), candidates.end(), [](const MethodPair& pair) { return find_strategy(pair.strategy)->null_collisions; });
+    double most_ns = std::numeric_limits<double>::infinity();
+    if (bounded != candidates.begin() && bounded != candidates.end()) {
+        const PilotRow rough = measure(scene, options, *bounded, until, most_ns, 1, pilot.pixels);
+        if (rough.measured()) most_ns = pilot_patience * rough.work_ns;
+        if (until.over() || (rough.error.empty() && pilot.pixels == 0)) return {};
+    }
     // Distances drawn by unbiased strategies have one distribution: what tells them apart is work, whatever the estimator.
     for (const MethodPair& pair : candidates) {
-        pilot.rows.push_back(measure(scene, options, pair, until, pilot.rows, pilot.pixels));
-        if (until.over() || (pilot.rows.back().error.empty() && pilot.pixels == 0)) return {};
+        pilot.rows.push_back(measure(scene, options, pair, until, most_ns, kSamples, pilot.pixels));
+        const PilotRow& row = pilot.rows.back();
+        if (until.over() || (row.error.empty() && pilot.pixels == 0)) return {};
+        if (row.measured()) most_ns = std::min(most_ns, strategy_patience * row.work_ns);
     }
     double variance = 0, measured = 0;
     for (const PilotRow& row : pilot.rows)
@@ -124,7 +133,7 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const Until&
     const MethodPair winner = pilot.rows[pilot.chosen].pair;
     for (const Method& e : estimators()) {
         if (e.kind != BiasKind::unbiased || e.name == estimator) continue;
-        pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, until, {pilot.rows[pilot.chosen]}, pilot.pixels));
+        pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, until, pilot_patience * pilot.rows[pilot.chosen].work_ns, kSamples, pilot.pixels));
         if (until.over()) return {};
     }
     const std::size_t best = best_of(pilot.rows);
@@ -163,7 +172,7 @@ std::vector<std::pair<std::string, std::string>> Pilot::table() const {
     std::vector<std::pair<std::string, std::string>> lines;
     for (std::size_t i = 0; i < rows.size(); ++i) {
         const PilotRow& r = rows[i];
-        const std::string what = r.too_slow ? fmt::format("given up: work above {:.0f} ns per path, {:.0f} times the least", r.work_ns, pilot_patience)
+        const std::string what = r.too_slow ? fmt::format("given up: work above {:.0f} ns per path", r.work_ns)
                                  : r.error.empty() ? fmt::format("variance {:.4g}, work {:.0f} ns per path, inverse efficiency {:.4g}{}", r.variance, r.work_ns, r.inverse_efficiency(), i == chosen ? "  <- chosen" : "")
                                                  : "not measured: " + r.error;
         lines.emplace_back("pilot " + r.pair.label(), what);

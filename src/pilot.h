@@ -19,8 +19,10 @@ namespace clume {
 
 /// By how much another estimator must be ahead of the winner's own to replace it: more than the weights are off by.
 inline constexpr double pilot_margin = 1.3;
-/// A pair is given up once it has taken that many times the work of the best one so far: variances differ by less.
+/// An estimator is given up once it has taken that many times the work of the winner's own: variances differ by less.
 inline constexpr double pilot_patience = 16;
+/// A strategy, once it has taken that many times the work of the best so far: unbiased ones have one variance.
+inline constexpr double strategy_patience = 2;
 
 struct PilotRow {
     MethodPair pair;

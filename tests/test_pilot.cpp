@@ -52,8 +52,10 @@ TEST_CASE("Pilot.ChoosesTheLeastInverseEfficiencyAgainAndAgain") {
             CHECK(row.error.empty());
             CHECK(row.variance == same.variance);
             CHECK(row.work_ns == same.work_ns);
-            CHECK(row.variance > 0);
+            CHECK(row.too_slow == same.too_slow);
             CHECK(row.work_ns > 0);
+            if (!row.measured()) continue;
+            CHECK(row.variance > 0);
             CHECK(pilot->rows[pilot->chosen].inverse_efficiency() <= pilot_margin * row.inverse_efficiency());
             if (row.pair.estimator == "analytic") CHECK(pilot->rows[pilot->chosen].inverse_efficiency() <= row.inverse_efficiency());
         }
@@ -73,7 +75,7 @@ TEST_CASE("Pilot.ChoosesTheLeastInverseEfficiencyAgainAndAgain") {
 }
 
 TEST_CASE("Pilot.FindsWhatIsCheapest") {
-    // Under high overlap every chord of decomposition is dear, and sorting them dearer still.
+    // Under high overlap every chord of decomposition is dear, and sorting them so dear that it is given up.
     const test::TempFolder folder;
     Scene scene = lit_mixture(400, 40);
     const auto pilot = run_pilot(scene, {}, folder.path(), go_on);
@@ -85,8 +87,9 @@ TEST_CASE("Pilot.FindsWhatIsCheapest") {
         if (row.pair.label() == "decomposition/analytic") work[1] = row.work_ns;
         if (row.pair.label() == "regular/analytic") work[2] = row.work_ns;
     }
+    CHECK(work[0] > 0);
     CHECK(work[0] < work[1]);
-    CHECK(work[1] < work[2]);
+    CHECK(work[2] == strategy_patience * work[0]);
 }
 
 TEST_CASE("Pilot.GivesUpWhatTakesForEver") {
@@ -98,13 +101,13 @@ TEST_CASE("Pilot.GivesUpWhatTakesForEver") {
     const auto pilot = run_pilot(scene, {}, folder.path(), go_on);
     REQUIRE(pilot);
     CHECK(pilot->rows[pilot->chosen].measured());
-    CHECK(pilot->rows.front().pair.strategy == "decomposition");
+    CHECK(pilot->rows[pilot->chosen].pair.strategy == "decomposition");
     std::size_t given_up = 0;
     for (const PilotRow& row : pilot->rows) {
         INFO(row.pair.label() << ", work " << row.work_ns);
         CHECK(row.error.empty());
         given_up += row.too_slow;
-        if (row.too_slow) CHECK(row.work_ns >= pilot_patience * pilot->rows[pilot->chosen].work_ns);
+        if (row.too_slow) CHECK(row.work_ns >= strategy_patience * pilot->rows[pilot->chosen].work_ns);
     }
     CHECK(given_up >= 1);
     const auto again = run_pilot(scene, {}, folder.path(), go_on);  // kept, with what was given up
