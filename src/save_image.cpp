@@ -27,7 +27,7 @@ fs::path free_name(const fs::path& folder, const fs::path& exr) {
     const std::string stem = exr.stem().string() + "-rescued";
     std::error_code error;
     for (int n = 1; n < 1000; ++n) {
-        const fs::path path = folder / (stem + (n == 1 ? "" : "-" + std::to_string(n)) + ".exr");
+        fs::path path = folder / (stem + (n == 1 ? "" : "-" + std::to_string(n)) + ".exr");
         if (!fs::exists(fs::symlink_status(path, error))) return path;
     }
     return folder / (stem + ".exr");

@@ -269,7 +269,7 @@ void check_stress_report(const fs::path& folder) {
 }
 
 fs::path write_stress_report(const fs::path& folder, std::span<const StressResult> results) {
-    const fs::path markdown = folder / "stability.md";
+    fs::path markdown = folder / "stability.md";
     const bool documented = fs::exists(markdown);
     const Report report(markdown, documented ? folder / "images" / "stability" : folder, kMadeBy);
     std::vector<std::pair<std::string, std::string>> plots;

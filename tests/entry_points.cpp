@@ -223,6 +223,7 @@ Outputs run_bench_kernels(const DeviceInfo& device, int width) {
         keep(out, fmt::format("{} w{}", name, width), output.download());
     };
     run(peaks, "peak_fma", result, result, count, rounds, 0.9f, 0.1f);
+    run(peaks, "peak_fma_add", result, result, count, rounds, 0.9f, 0.1f);
     run(peaks, "peak_read", result, in, result, count, cl_uint(15), rounds, cl_uint(1));
     run(peaks, "peak_gather", result, in, result, count, cl_uint(127), rounds, cl_uint(1));
     run(peaks, "peak_nothing", result, result, count);
