@@ -41,14 +41,14 @@ public:
     SizedLaunch(Session& session, Queue& queue, cl::Kernel& kernel, const SetArguments& set_arguments, double seconds = 3e-3, std::size_t most_items = std::size_t{1} << 22);
     std::size_t items() const { return out_.size(); }
     double operator()() const;  ///< seconds on the device
-    /// The same, on a CPU by processor time of all its units, which other programs do not lengthen.
+    /// The same, on a CPU by processor time of the busiest thread, which other programs do not lengthen.
     double undisturbed() const;
 
 private:
     Queue& queue_;
     cl::Kernel& kernel_;
     std::size_t local_;
-    double cpu_units_;  ///< 0 if the device is no CPU
+    bool cpu_;
     Buffer<float> out_;
 };
 
