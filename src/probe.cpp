@@ -52,20 +52,23 @@ struct Probe::Impl {
     /// The same for a kernel whose first arguments are the scene.
     template <class... Args>
     double run_in_scene(const char* name, std::size_t items, const Args&... args) {
-        return launch(name, items, [&](cl::Kernel& kernel) {
-            scene.bind(queue, kernel);
-            set_args(queue, kernel, SceneBuffers::kArgs, args...);
-        });
+        return launch(name, items, [&](cl::Kernel& kernel) { bind(kernel, args...); });
+    }
+
+    template <class... Args>
+    void bind(cl::Kernel& kernel, const Args&... args) {
+        scene.bind(queue, kernel);
+        set_args(queue, kernel, SceneBuffers::kArgs, args...);
     }
 
     template <class SetArgs>
-    double launch(const char* name, std::size_t items, const SetArgs& set) {
+    double launch(const char* name, std::size_t items, const SetArgs& set, std::size_t local = kLocalSize) {
         const bool first = code.kernels.find(name) == code.kernels.end();
         if (first) code.kernels.emplace(name, make_kernel(queue, code.program, name));
         cl::Kernel& kernel = code.kernels.at(name);
         set(kernel);
-        if (first) queue.launch(kernel, kLocalSize, kLocalSize);
-        return queue.launch(kernel, items, kLocalSize);
+        if (first) queue.launch(kernel, local, local);
+        return queue.launch(kernel, items, local);
     }
 
     Compiled& code;
@@ -97,11 +100,11 @@ ProbeRun<ProbeHit> Probe::rays(std::span<const ProbeRay> rays, std::uint32_t sam
 ProbeRun<ProbeHit> Probe::flights(std::span<const ProbeRay> r, std::uint32_t sample) {
     if (!impl_->lanes || width_ == 1) return rays(r, sample, 1);
     Impl& s = *impl_;
-    const std::size_t each = 16 * static_cast<std::size_t>(width_);
+    const std::size_t each = 64 * static_cast<std::size_t>(width_);  // as the renderer's work-items: lanes idle at the end of each
     Buffer<ProbeRay> in(s.queue, r);
     Buffer<ProbeHit> out(s.queue, r.size());
     ProbeRun<ProbeHit> result;
-    result.device_s = s.run_in_scene("probe_flights", (r.size() + each - 1) / each, in, out, cl_uint(r.size()), cl_uint(sample), cl_uint(each));
+    result.device_s = s.launch("probe_flights", (r.size() + each - 1) / each, [&](cl::Kernel& kernel) { s.bind(kernel, in, out, cl_uint(r.size()), cl_uint(sample), cl_uint(each)); }, 1);
     result.values = out.download();
     return result;
 }
