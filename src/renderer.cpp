@@ -177,7 +177,7 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     }
     impl_->window = o.crop.value_or(CropWindow{0, 0, scene.film.width, scene.film.height});
 
-    const auto packed = std::make_shared<const DeviceScene>(make_device_scene(scene, o));
+    const auto packed = std::make_shared<DeviceScene>(make_device_scene(scene, o));
     const DeviceScene& device = *packed;
     RenderStats& stats = impl_->setup;
     stats.strategy = device.strategy;
@@ -192,6 +192,7 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     require_memory(scene.path, {{"image", impl_->all_pixels() * image_bytes}});
 
     impl_->pixels = active_pixels(scene, device, impl_->window);
+    packed->ellipsoids = std::vector<Ellipsoid>();  // 152 bytes a primitive that nobody needs from here on
     if (const std::size_t n = impl_->pixels.size(); o.most_pixels > 0 && n > o.most_pixels) {
         std::vector<device::uint> some;
         for (std::size_t i = 0; i < o.most_pixels; ++i) some.push_back(impl_->pixels[i * n / o.most_pixels]);
