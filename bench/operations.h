@@ -35,10 +35,10 @@ Operations operations(std::string_view block);
 
 /// What no single block shows, counted by hand. A step from one root cell to the next (cells_next): 4 comparisons and 4 ands
 /// for the axes crossed, 4 additions and 3 tests of the link, 8 for the plane, 4 fma and 6 for the exit.
-inline constexpr Operations cell_step_operations {33, 4};
+inline constexpr Operations cell_step_operations{33, 4};
 /// Of a tentative collision beside its blocks: depth to it, which of two primitives and its scale, the place, acceptance.
-inline constexpr Operations tentative_operations {16, 4};
+inline constexpr Operations tentative_operations{16, 4};
 /// Of one child of a node of the bvh: is it there, is it near enough, is it a leaf.
-inline constexpr Operations child_operations {3, 0};
+inline constexpr Operations child_operations{3, 0};
 
 }  // namespace clume::bench

@@ -89,32 +89,40 @@ MATH_S(acos, acos_s(x), acos(x))
 MATH_S(atan2, atan2_s(x, y), atan2(x, y))
 MATH_S(normalize, normalize_s((float3)(x, y, y)).x, normalize((float3)(x, y, y)).x)
 
+static vuint lane_numbers(uint first) {
+    vuint numbers;
+    for (int lane = 0; lane < CLUME_WIDTH; ++lane) ((uint*)&numbers)[lane] = first + (uint)lane;
+    return numbers;
+}
+
+static float lanes_folded(vuint x) {
+    uint total = 0;
+    for (int lane = 0; lane < CLUME_WIDTH; ++lane) total ^= ((const uint*)&x)[lane];
+    return (float)total;
+}
+
 /// Draws of four random words by CLUME_WIDTH paths at a time.
 __kernel void random_draw(__global float* out, uint count, uint rounds) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
-    vuint pixel, sum = (vuint)0u;
-    for (int lane = 0; lane < CLUME_WIDTH; ++lane) ((uint*)&pixel)[lane] = i * CLUME_WIDTH + (uint)lane;
+    const vuint pixel = lane_numbers(i * CLUME_WIDTH);
+    vuint sum = (vuint)0u;
     for (uint k = 0; k < rounds; ++k) {
         vuint x, y, z, w;
         draw_v(pixel + (vuint)k, pixel, pixel >> (vuint)1u, (vuint)k, (uint2)(3u, 5u), &x, &y, &z, &w);
         sum += x ^ y ^ z ^ w;
     }
-    uint total = 0;
-    for (int lane = 0; lane < CLUME_WIDTH; ++lane) total ^= ((const uint*)&sum)[lane];
-    out[i] = (float)total;
+    out[i] = lanes_folded(sum);
 }
 
 /// Words of CLUME_WIDTH primitives at a time.
 __kernel void random_primitive_bits(__global float* out, uint count, uint rounds) {
     const uint i = (uint)get_global_id(0);
     if (i >= count) return;
-    vuint id, sum = (vuint)0u;
-    for (int lane = 0; lane < CLUME_WIDTH; ++lane) ((uint*)&id)[lane] = (uint)lane;
+    const vuint id = lane_numbers(0);
+    vuint sum = (vuint)0u;
     for (uint k = 0; k < rounds; ++k) sum += primitive_bits(id + (vuint)(k * CLUME_WIDTH), (uint2)(i, 5u));
-    uint total = 0;
-    for (int lane = 0; lane < CLUME_WIDTH; ++lane) total ^= ((const uint*)&sum)[lane];
-    out[i] = (float)total;
+    out[i] = lanes_folded(sum);
 }
 
 // Phase functions: directions sampled about those given, or values at versines between 0 and 2.

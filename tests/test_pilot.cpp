@@ -89,6 +89,7 @@ TEST_CASE("Pilot.FindsWhatIsCheapest") {
     }
     CHECK(work[0] > 0);
     CHECK(work[0] < work[1]);
+    CHECK(work[1] < work[2]);
     CHECK(work[2] == strategy_patience * work[0]);
 }
 
@@ -107,7 +108,9 @@ TEST_CASE("Pilot.GivesUpWhatTakesForEver") {
         INFO(row.pair.label() << ", work " << row.work_ns);
         CHECK(row.error.empty());
         given_up += row.too_slow;
-        if (row.too_slow) CHECK(row.work_ns >= strategy_patience * pilot->rows[pilot->chosen].work_ns);
+        // Null collisions by a rough idea of decomposition's work, from a sample a pixel.
+        const double patience = row.pair.strategy == "delta" ? 0.9 * pilot_patience : strategy_patience;
+        if (row.too_slow) CHECK(row.work_ns >= patience * pilot->rows[pilot->chosen].work_ns);
     }
     CHECK(given_up >= 1);
     const auto again = run_pilot(scene, {}, folder.path(), go_on);  // kept, with what was given up
