@@ -84,7 +84,7 @@ struct Walk {
                    : Cost{cell_step_operations * steps, steps * sizeof(device::CellEntry), steps, static_cast<double>(device.cells.size() * sizeof(device::CellEntry))};
         make(false);
     }
-    double launch() { return program->queue.launch(kernel, rays.size(), 8); }
+    double launch() { return program->queue.launch(kernel, rays.size(), program->queue.info().group_size()); }
     std::unique_ptr<SceneProgram> program;
     cl::Kernel kernel;
     Buffer<ProbeRay> rays;

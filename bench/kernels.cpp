@@ -103,7 +103,7 @@ std::map<int, double> thread_seconds() {
 }  // namespace
 
 SizedLaunch::SizedLaunch(Session& session, Queue& queue, cl::Kernel& kernel, const SetArguments& set_arguments, double seconds, std::size_t most_items)
-    : queue_(queue), kernel_(kernel), local_(session.device().type == "cpu" ? 8 : 64), cpu_(session.device().type == "cpu") {
+    : queue_(queue), kernel_(kernel), local_(session.device().group_size()), cpu_(session.device().type == "cpu") {
     const std::size_t first = local_ * session.device().compute_units;
     for (std::size_t items = first;; items *= 2) {
         out_ = Buffer<float>(queue, items);

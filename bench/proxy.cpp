@@ -123,7 +123,7 @@ double ProxyLines::tests() const { return static_cast<double>(kLines) * kGroups 
 double ProxyLines::launch(ProxyWork what) {
     Impl& s = *impl_;
     set_args(s.queue, s.kernel, 0, s.groups, s.meshes, s.faces, s.normals, s.lines, s.out, s.reach, cl_uint(kLines), cl_uint(kGroups), s.e2, cl_uint(what));
-    return s.queue.launch(s.kernel, kLines, 8);
+    return s.queue.launch(s.kernel, kLines, s.queue.info().group_size());
 }
 
 std::vector<device::float4> ProxyLines::out() const { return impl_->out.download(); }

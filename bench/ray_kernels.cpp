@@ -95,7 +95,7 @@ Cost count(Session& session, const Field& f, const std::vector<ProbeRay>& all, c
     const Buffer<device::ulong> out(program.queue, rays.size() * words);
     cl::Kernel kernel = program.kernel("count_ray");
     program.set(kernel, in, out, cl_uint(rays.size()), what);
-    program.queue.launch(kernel, rays.size(), 8);
+    program.queue.launch(kernel, rays.size(), program.queue.info().group_size());
     const auto per_ray = [&](auto n) { return static_cast<double>(n) / static_cast<double>(rays.size()); };
     std::array<double, WORK_KINDS> n{};
     const std::vector<device::ulong> counts = out.download();

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Entry points that only the benchmarks have: the renderer's building blocks in loops over arrays that stay in the cache, one
 // float left per work-item, beside the implementation's own functions; and rays whose every evaluation is tallied.
+#define CLUME_POOL 0  // a pixel's sums are a work-item's own
 #include "ellipsoid.cl"
 
 // In a program that counts, a word of `raised` goes up at each call (intersect, density, depth, inverse; then groups of 16
 // active chords summed for depth and for density): how often vectors are evaluated depends on the lanes that are hit.
 #if CLUME_COUNT && defined(CLUME_TALLY)
 #define TALLY(k, n) atomic_add(raised + CLUME_TALLY + (k), (uint)(n))
-#define intersect(...) (TALLY(0, 1), intersect(__VA_ARGS__))
-#define density_part(...) (TALLY(1, 1), density_part(__VA_ARGS__))
-#define depth_part(...) (TALLY(2, 1), depth_part(__VA_ARGS__))
-#define flight_part(...) (TALLY(3, 1), flight_part(__VA_ARGS__))
+#define intersect(part, o, d, e2, chord) (TALLY(0, 1), intersect(part, o, d, e2, chord))
+#define density_part(part, p, family, e2) (TALLY(1, 1), density_part(part, p, family, e2))
+#define depth_part(chord, sigma, t0, t1, family, e2) (TALLY(2, 1), depth_part(chord, sigma, t0, t1, family, e2))
+#define flight_part(chord, sigma, t, tau, family, e2) (TALLY(3, 1), flight_part(chord, sigma, t, tau, family, e2))
 #endif
 #include "medium.cl"
 #undef density_part

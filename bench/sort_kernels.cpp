@@ -69,7 +69,7 @@ struct Segments {
             active += static_cast<double>(v.z);
         }
     }
-    double launch() { return program->queue.launch(kernel, rays.size(), 8); }
+    double launch() { return program->queue.launch(kernel, rays.size(), program->queue.info().group_size()); }
     /// Per segment: each sixteen of its chords summed, every chord looked at for the first end and for having ended.
     Cost cost() const { return {(operations("depth/gaussian") + Operations{1, 0}) * (16 * sums / segments) + Operations{3 * active / segments, 0}, (16 * sums * 32 + 4 * active) / segments, 0, sizeof(float) * 256 * 9.0}; }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a program is specialised to: every -D with its default, and the vector types of the chosen width.
-// A vector of W primitives is `vfloat`; comparisons give `vint` masks, used through `vselect(a, b, mask)` = mask ? b : a.
+// A vector of W primitives is `vfloat`; comparisons give `vint` masks, for `vselect(a, b, mask)` = mask ? b : a, `vany`, `vnot`, & and |.
 #include "layout.h"
 
 #pragma OPENCL FP_CONTRACT OFF
@@ -106,19 +106,27 @@
 #define CLUME_PER_PRIMITIVE (!CLUME_UNIFORM_G || !CLUME_UNIFORM_ALBEDO || CLUME_EMISSION == 2 || \
                              (!CLUME_ONE_MEDIUM && CLUME_PHASES != PHASE_ISOTROPIC))
 
-// 1: a work-item follows CLUME_WIDTH paths side by side, instead of one beside which it looks at CLUME_WIDTH primitives.
+// 1: a work-item follows CLUME_WIDTH paths side by side, instead of one beside which it looks at CLUME_WIDTH primitives. On devices
+// whose work-items go side by side themselves (CLUME_WIDTH 1) it follows one, and looks up often enough for its neighbours' sake.
 #ifndef CLUME_LANES
 #define CLUME_LANES 0
 #endif
-#if CLUME_WIDTH == 1
-#undef CLUME_LANES
-#define CLUME_LANES 0
+// 1: work-items take the next sample of any pixel from a pool that all share, instead of each having its own: on devices whose
+// work-items go side by side, none of them idles before all have ended.
+#ifndef CLUME_POOL
+#define CLUME_POOL (CLUME_WIDTH == 1)
 #endif
 #ifndef CLUME_LANES_ENOUGH  // sixteenths of the flights under way that are left when those that ended are looked after
 #define CLUME_LANES_ENOUGH 10
 #endif
 #ifndef CLUME_LANES_STEPPING  // sixteenths of the flights under way that may be between cells while the others collide
 #define CLUME_LANES_STEPPING 7
+#endif
+#ifndef CLUME_LANES_STEPS  // of CLUME_WIDTH 1: steps between cells before its neighbours' collisions are looked after
+#define CLUME_LANES_STEPS 4
+#endif
+#ifndef CLUME_LANES_ROUNDS  // of CLUME_WIDTH 1: collisions before its neighbours' flights that ended are looked after
+#define CLUME_LANES_ROUNDS 8
 #endif
 
 #define CONCAT_(a, b) a##b
@@ -131,6 +139,7 @@ typedef uint vuint;
 typedef ulong vulong;
 #define vselect(a, b, mask) ((mask) ? (b) : (a))
 #define vany(mask) (mask)
+#define vnot(mask) (!(mask))
 #define as_vint(x) as_int(x)
 #define as_vuint(x) as_uint(x)
 #define as_vfloat(x) as_float(x)
@@ -155,6 +164,7 @@ typedef CONCAT(ulong, CLUME_HALF_WIDTH) vpairs;  // the bits of a vuint, two lan
 #define as_vpairs(x) CONCAT(as_ulong, CLUME_HALF_WIDTH)(x)
 #define pairs_as_vuint(x) CONCAT(as_uint, CLUME_WIDTH)(x)
 #define vselect(a, b, mask) select((a), (b), (mask))
+#define vnot(mask) (~(mask))
 #define as_vint(x) CONCAT(as_int, CLUME_WIDTH)(x)
 #define as_vuint(x) CONCAT(as_uint, CLUME_WIDTH)(x)
 #define as_vfloat(x) CONCAT(as_float, CLUME_WIDTH)(x)

@@ -15,11 +15,41 @@ typedef float3 spectrum;
 #define spectrum_sum(s) ((s).x + (s).y + (s).z)
 #endif
 
-#if CLUME_LANES
+#if CLUME_LANES || CLUME_POOL
 #define FILM_SPACE __global  // a work-item adds to many pixels
 #else
 #define FILM_SPACE
 #endif
+
+/// The 128-bit sum (lo, hi) += (lo, hi).
+static void film_add_pair(FILM_SPACE ulong* sum, ulong lo, ulong hi) {
+#if CLUME_POOL
+    // Others add to it, too: word by word, each addition passing on the carry that it makes, so that in the end all are in.
+    volatile __global uint* words = (volatile __global uint*)sum;
+    const uint parts[4] = {(uint)lo, (uint)(lo >> 32), (uint)hi, (uint)(hi >> 32)};
+    uint carry = 0;
+    for (int k = 0; k < 4; ++k) {
+        const uint part = parts[k] + carry;
+        carry = part < carry ? 1 : 0;
+        if (part != 0 && atomic_add(words + k, part) > ~part) carry = 1;
+    }
+#else
+    sum[0] += lo;
+    sum[1] += hi + (sum[0] < lo ? 1 : 0);
+#endif
+}
+
+/// The counter += n.
+static void film_count(FILM_SPACE ulong* counter, ulong n) {
+#if CLUME_POOL
+    volatile __global uint* words = (volatile __global uint*)counter;
+    const uint lo = (uint)n, hi = (uint)(n >> 32);
+    const uint carry = lo != 0 && atomic_add(words, lo) > ~lo ? 1 : 0;
+    if (hi + carry != 0) atomic_add(words + 1, hi + carry);
+#else
+    *counter += n;
+#endif
+}
 
 /// (lo, hi) += x, for 0 <= x < 2^61.
 static void film_add(FILM_SPACE ulong* sum, float x) {
@@ -38,8 +68,7 @@ static void film_add(FILM_SPACE ulong* sum, float x) {
         lo = 0;
         hi = mantissa << (shift - 64);
     }
-    sum[0] += lo;
-    sum[1] += hi + (sum[0] < lo ? 1 : 0);
+    film_add_pair(sum, lo, hi);
 }
 
 /// Adds one sample: per channel x and x². A sample that is not finite (or beyond 2^30) is counted and adds nothing.
@@ -47,7 +76,7 @@ static void film_sample(FILM_SPACE ulong* sums, spectrum radiance, float scale) 
     const float total = spectrum_sum(radiance) * scale;
     if (total == 0.0f) return;
     if (!(total > 0.0f && total < 0x1p30f)) {
-        sums[FILM_NONFINITE] += 1;
+        film_count(sums + FILM_NONFINITE, 1);
         return;
     }
 #if CLUME_CHANNELS == 1

@@ -12,15 +12,32 @@
 // one; shuffle2 is a function to some, and vectors put together element by element are taken apart by all.
 #ifdef __has_builtin
 #if __has_builtin(__builtin_shufflevector)
-#define LANES_PICK(p, q, ...) __builtin_shufflevector(p, q, __VA_ARGS__)
+#define LANES_PICK(p, q, places) __builtin_shufflevector(p, q, places)
 #endif
 #endif
 #ifndef LANES_PICK
-#define LANES_PICK(p, q, ...) shuffle2(p, q, (vuint)(__VA_ARGS__))
+#define LANES_PICK(p, q, places) shuffle2(p, q, (vuint)(places))
+#endif
+#if CLUME_WIDTH == 16
+#define LANES_LOW 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29
+#define LANES_HIGH 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31
+#elif CLUME_WIDTH == 8
+#define LANES_LOW 0, 8, 1, 9, 4, 12, 5, 13
+#define LANES_HIGH 2, 10, 3, 11, 6, 14, 7, 15
+#else
+#define LANES_LOW 0, 4, 1, 5
+#define LANES_HIGH 2, 6, 3, 7
 #endif
 
 /// The four words of record `index` of each lane, a word a vector.
 static void lanes_load(__global const uint4* records, vuint index, vuint* a, vuint* b, vuint* c, vuint* d) {
+#if CLUME_WIDTH == 1
+    const uint4 record = records[index];
+    *a = record.x;
+    *b = record.y;
+    *c = record.z;
+    *d = record.w;
+#else
     const uint* i = (const uint*)&index;
     // Rows of four lanes' records beside each other, then 4 × 4 transposes in place: two rounds of interleaving.
 #if CLUME_WIDTH == 16
@@ -28,25 +45,19 @@ static void lanes_load(__global const uint4* records, vuint index, vuint* a, vui
     const uint16 r1 = (uint16)(records[i[1]], records[i[5]], records[i[9]], records[i[13]]);
     const uint16 r2 = (uint16)(records[i[2]], records[i[6]], records[i[10]], records[i[14]]);
     const uint16 r3 = (uint16)(records[i[3]], records[i[7]], records[i[11]], records[i[15]]);
-#define LANES_LOW(p, q) LANES_PICK(p, q, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29)
-#define LANES_HIGH(p, q) LANES_PICK(p, q, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31)
 #elif CLUME_WIDTH == 8
     const uint8 r0 = (uint8)(records[i[0]], records[i[4]]), r1 = (uint8)(records[i[1]], records[i[5]]);
     const uint8 r2 = (uint8)(records[i[2]], records[i[6]]), r3 = (uint8)(records[i[3]], records[i[7]]);
-#define LANES_LOW(p, q) LANES_PICK(p, q, 0, 8, 1, 9, 4, 12, 5, 13)
-#define LANES_HIGH(p, q) LANES_PICK(p, q, 2, 10, 3, 11, 6, 14, 7, 15)
 #else
     const uint4 r0 = records[i[0]], r1 = records[i[1]], r2 = records[i[2]], r3 = records[i[3]];
-#define LANES_LOW(p, q) LANES_PICK(p, q, 0, 4, 1, 5)
-#define LANES_HIGH(p, q) LANES_PICK(p, q, 2, 6, 3, 7)
 #endif
-    const vuint lo02 = LANES_LOW(r0, r2), lo13 = LANES_LOW(r1, r3), hi02 = LANES_HIGH(r0, r2), hi13 = LANES_HIGH(r1, r3);
-    *a = LANES_LOW(lo02, lo13);
-    *b = LANES_HIGH(lo02, lo13);
-    *c = LANES_LOW(hi02, hi13);
-    *d = LANES_HIGH(hi02, hi13);
-#undef LANES_LOW
-#undef LANES_HIGH
+    const vuint lo02 = LANES_PICK(r0, r2, LANES_LOW), lo13 = LANES_PICK(r1, r3, LANES_LOW);
+    const vuint hi02 = LANES_PICK(r0, r2, LANES_HIGH), hi13 = LANES_PICK(r1, r3, LANES_HIGH);
+    *a = LANES_PICK(lo02, lo13, LANES_LOW);
+    *b = LANES_PICK(lo02, lo13, LANES_HIGH);
+    *c = LANES_PICK(hi02, hi13, LANES_LOW);
+    *d = LANES_PICK(hi02, hi13, LANES_HIGH);
+#endif
 }
 
 /// Where CLUME_WIDTH flights are: CellWalk, a vector a member, and the tentative collision that each waits for.

@@ -17,6 +17,9 @@ static void lanes_bits(const LaneDraws* r, vuint draw, vuint* a, vuint* b, vuint
 }
 
 static int lanes_count(vint mask) {
+#if CLUME_WIDTH == 1
+    return mask != 0;
+#else
 #if CLUME_WIDTH == 16
     const int8 a = mask.lo + mask.hi;
     const int4 b = a.lo + a.hi;
@@ -26,6 +29,23 @@ static int lanes_count(vint mask) {
     const int4 b = mask;
 #endif
     return -((b.x + b.y) + (b.z + b.w));
+#endif
+}
+
+/// The sum over the lanes.
+static uint lanes_total(vuint v) {
+    uint sum = 0;
+    for (int i = 0; i < CLUME_WIDTH; ++i) sum += ((const uint*)&v)[i];
+    return sum;
+}
+
+/// Whether enough of the flights under way wait for a collision.
+static bool lanes_brought(vint stepping, vint under_way, int steps) {
+#if CLUME_WIDTH == 1
+    return !stepping || steps == CLUME_LANES_STEPS;
+#else
+    return lanes_count(16 * stepping - CLUME_LANES_STEPPING * under_way) <= 0;
+#endif
 }
 
 /// primitive_kernel of each lane's primitive at its t.
@@ -81,22 +101,22 @@ static vint lanes_begin(LaneFlights* f, vfloat t_end, const LaneDraws* r, vint m
 #endif
 
 /// Flies the lanes in *under_way until no more than `enough` are; those that end, or have drawn a multiple of LANES_MANY, are taken
-/// out of it, and set *result. *above: −1 per lane for each look-up above its bound.
-static void lanes_fly_on(LaneFlights* f, const LaneDraws* r, vint* under_way, vint* result, int enough, vint* above, SCENE_ARGS) {
-    for (;;) {
+/// out of it, and set *result. *above: look-ups above their bound.
+static void lanes_fly_on(LaneFlights* f, const LaneDraws* r, vint* under_way, vint* result, int enough, vuint* above, SCENE_ARGS) {
+    for (int round = 0; CLUME_WIDTH > 1 || round < CLUME_LANES_ROUNDS; ++round) {
         // Steps are cheap beside collisions: most lanes are brought to one first.
         vfloat end;
         vint tentative;
-        for (;;) {
+        for (int steps = 0;; ++steps) {
             end = min_v(f->t_exit, f->t_end);
             const vfloat depth = f->majorant * (end - f->t);
             tentative = *under_way & (f->tau < depth);
-            const vint stepping = *under_way & ~tentative;
-            if (lanes_count(16 * stepping - CLUME_LANES_STEPPING * *under_way) <= 0) break;
+            const vint stepping = *under_way & vnot(tentative);
+            if (lanes_brought(stepping, *under_way, steps)) break;
             LANE_SET(f->tau, f->tau - depth, stepping);
-            const vint left = stepping & ~lanes_next(f, stepping, params, cells);
+            const vint left = stepping & vnot(lanes_next(f, stepping, params, cells));
             LANE_SET(*result, (vint)FLIGHT_ESCAPED, left);
-            *under_way &= ~left;
+            *under_way &= vnot(left);
         }
         if (vany(tentative)) {
             LANE_SET(f->t, min_v(fma(f->tau, rcp_v(f->majorant), f->t), end), tentative);
@@ -107,14 +127,14 @@ static void lanes_fly_on(LaneFlights* f, const LaneDraws* r, vint* under_way, vi
             const vuint primitive = vselect((vuint)0u, vselect(other, own, mine), tentative);
             const vfloat scale = as_vfloat(vselect(scales, scales << (vuint)16u, mine) & (vuint)0xffff0000u);
             const vfloat probability = scale * lanes_kernel(f, primitive, primitives);
-            *above += tentative & (probability > (vfloat)1.0f);
+            *above += vselect((vuint)0u, (vuint)1u, tentative & (probability > (vfloat)1.0f));
             LANE_SET(f->draw, f->draw + 1u, tentative);
             const vint real = tentative & (uniform_v(f->accept) < probability);
             LANE_SET(f->primitive, primitive, real);
-            const vint many = tentative & ~real & ((f->draw % (vuint)LANES_MANY) == (vuint)0u);
+            const vint many = tentative & vnot(real) & ((f->draw % (vuint)LANES_MANY) == (vuint)0u);
             LANE_SET(*result, (vint)FLIGHT_COLLIDED, real);
             LANE_SET(*result, (vint)FLIGHT_PAUSED, many);
-            *under_way &= ~(real | many);
+            *under_way &= vnot(real | many);
             lanes_draw(f, r, tentative);
         }
         if (lanes_count(*under_way) <= enough) return;
@@ -122,10 +142,10 @@ static void lanes_fly_on(LaneFlights* f, const LaneDraws* r, vint* under_way, vi
 }
 
 /// Flies the lanes in *under_way until no more than `enough` are; those that end, or pause, are taken out of it, and set *result.
-static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint* result, int enough, vint* above, SCENE_ARGS) {
+static void lanes_fly(LaneFlights* f, const LaneDraws* r, vint* under_way, vint* result, int enough, vuint* above, SCENE_ARGS) {
     const vint before = *under_way;
     lanes_fly_on(f, r, under_way, result, enough, above, SCENE);
-    const vint many = before & ~*under_way & (*result == (vint)FLIGHT_PAUSED) & ((f->draw % (vuint)CLUME_FLIGHT_DRAWS) != (vuint)0u);
+    const vint many = before & vnot(*under_way) & (*result == (vint)FLIGHT_PAUSED) & ((f->draw % (vuint)CLUME_FLIGHT_DRAWS) != (vuint)0u);
     if (!vany(many)) return;
     // Out of patience: the rest of their cells is left to cell_decompose.
     for (int i = 0; i < CLUME_WIDTH; ++i) {

@@ -26,7 +26,7 @@ typedef struct {
     vfloat light[CLUME_CHANNELS];    // what it adds if it gets through
     vfloat next_x, next_y, next_z;   // direction that the path takes afterwards
 #endif
-    vint above;               // −1 per lane for each look-up above its bound by lanes_fly
+    vuint above;              // look-ups above their bound by lanes_fly
     uint violations;          // such look-ups by others
     uint tentative;           // tentative collisions of shadow rays
     ulong excess;
@@ -44,6 +44,20 @@ typedef struct {
 
 static void lane_add(vfloat* radiance, int i, spectrum s) {
     for (int c = 0; c < CLUME_CHANNELS; ++c) ((float*)(radiance + c))[i] += LANE_CHANNEL(s, c);
+}
+
+/// A pixel's lower corner on the film, from the scene's centre.
+static float2 film_corner(uint pixel, __constant const RenderParams* params) {
+    const uint y = pixel / params->film_width;
+    return (float2)((float)(pixel - y * params->film_width) - params->film_cx, (float)y - params->film_cy);
+}
+
+/// Lane i's paths are the pixel's from now on.
+static void lanes_aim(Lanes* l, uint i, uint pixel, __constant const RenderParams* params) {
+    const float2 corner = film_corner(pixel, params);
+    ((uint*)&l->draws.pixel)[i] = pixel;
+    ((float*)&l->film_x)[i] = corner.x;
+    ((float*)&l->film_y)[i] = corner.y;
 }
 
 /// path_begin of the lanes in `mask`, whose sample and pixel are set.
@@ -72,14 +86,14 @@ static void lanes_start(Lanes* l, vint mask, __constant const RenderParams* para
     }
     LANE_SET(l->phase_pdf, (vfloat)0.0f, mask);
     l->alive |= mask;
-    l->alpha &= ~mask;
+    l->alpha &= vnot(mask);
 }
 
 /// Begins the flights of the lanes in `mask`.
 static void lanes_depart(Lanes* l, vint mask, __constant const RenderParams* params, __global const CellEntry* cells, __global const LightInfo* lights) {
     vint path = mask;
 #if LANE_SHADOWS
-    path &= ~l->shadow;  // a shadow ray knows its end
+    path &= vnot(l->shadow);  // a shadow ray knows its end
 #endif
     LANE_SET(l->t_surface, (vfloat)CLUME_INFINITY, path);
 #if LIGHT_SURFACES
@@ -88,7 +102,7 @@ static void lanes_depart(Lanes* l, vint mask, __constant const RenderParams* par
             ((float*)&l->t_surface)[i] = surfaces_nearest(lane_origin(&l->flight, i), lane_direction(&l->flight, i), CLUME_INFINITY, NO_LIGHT, (uint*)&l->surface + i, params, lights);
 #endif
     const vint under_way = lanes_begin(&l->flight, l->t_surface, &l->draws, mask, params, cells);
-    LANE_SET(l->result, (vint)FLIGHT_ESCAPED, mask & ~under_way);
+    LANE_SET(l->result, (vint)FLIGHT_ESCAPED, mask & vnot(under_way));
     l->under_way |= under_way;
 }
 
@@ -115,7 +129,7 @@ static void lanes_escape(Lanes* l, vint mask, SCENE_ARGS) {
     vint missing = mask;
 #if LIGHT_SURFACES
     missing &= l->surface == (vuint)NO_LIGHT;
-    l->alpha |= mask & ~missing & (l->draws.depth == (vuint)0u);
+    l->alpha |= mask & vnot(missing) & (l->draws.depth == (vuint)0u);
 #endif
 #if LIGHT_ENVIRONMENTS == LIGHT_CONSTANT
     if (vany(missing)) lanes_environment(l, missing, params, lights);
@@ -137,7 +151,7 @@ static void lanes_escape(Lanes* l, vint mask, SCENE_ARGS) {
 #endif
     }
 #endif
-    l->alive &= ~mask;
+    l->alive &= vnot(mask);
 }
 
 /// The paths in `mask` go on from where they are, in a new direction.
@@ -197,11 +211,11 @@ static void lanes_collide(Lanes* l, vint mask, SCENE_ARGS) {
     const vint roulette = lives & (as_vint(l->draws.depth) >= (vint)params->rr_depth) & (most < (vfloat)1.0f);
     if (vany(roulette)) {
         lanes_bits(&l->draws, (vuint)DRAW_ROULETTE, &a, &b, &c, &d);
-        lives &= ~(roulette & (uniform_v(a) >= most));
+        lives &= vnot(roulette & (uniform_v(a) >= most));
         const vfloat gain = rcp_v(most);
         for (int k = 0; k < CLUME_CHANNELS; ++k) LANE_SET(l->beta[k], l->beta[k] * gain, roulette & lives);
     }
-    l->alive &= ~mask | lives;
+    l->alive &= vnot(mask) | lives;
     if (!vany(lives)) return;
     LANE_SET(f->ox, fma(f->t, f->dx, f->ox), lives);
     LANE_SET(f->oy, fma(f->t, f->dy, f->oy), lives);
@@ -241,7 +255,7 @@ static void lanes_collide(Lanes* l, vint mask, SCENE_ARGS) {
 #endif
     LANE_SET(f->t, (vfloat)0.0f, lives);
 #if LANE_SHADOWS
-    const vint shadow = lives & ~onward;
+    const vint shadow = lives & vnot(onward);
     LANE_SET(l->next_x, x, shadow);
     LANE_SET(l->next_y, y, shadow);
     LANE_SET(l->next_z, z, shadow);
@@ -257,9 +271,83 @@ static void lanes_lit(Lanes* l, vint mask) {
     const vint clear = mask & (l->result == (vint)FLIGHT_ESCAPED);
     for (int k = 0; k < CLUME_CHANNELS; ++k) LANE_SET(l->radiance[k], l->radiance[k] + l->light[k], clear);
     LANE_SET(l->flight.t, (vfloat)0.0f, mask);
-    l->shadow &= ~mask;
+    l->shadow &= vnot(mask);
     lanes_turn(l, l->next_x, l->next_y, l->next_z, mask);
 }
 #endif
+
+/// All lanes idle. They are computed with, too, so that nothing may be undefined.
+static void lanes_clear(Lanes* l, __constant const RenderParams* params) {
+    for (uint i = 0; i < sizeof(Lanes) / sizeof(uint); ++i) ((uint*)l)[i] = 0;
+    l->result = (vint)FLIGHT_ESCAPED;
+    l->draws.seed = (uint2)(params->seed_lo, params->seed_hi);
+}
+
+/// A step of all paths: those in *waiting depart (if `tired`, only to end a shadow ray: paths are not saved amid one), those in *out
+/// fly on, and what has ended is looked after. *over: the paths that are complete. False if none is out.
+static bool lanes_advance(Lanes* l, vint* waiting, vint* out, bool tired, vint* over, int* events, SCENE_ARGS) {
+    vint departing = tired ? (vint)0 : *waiting;
+#if LANE_SHADOWS
+    departing |= *waiting & l->shadow;
+#endif
+    if (vany(departing)) lanes_depart(l, departing, params, cells, lights);
+    *out |= departing;
+    *waiting &= vnot(departing);
+    if (!vany(*out)) return false;
+    const int busy = lanes_count(l->under_way);
+    if (busy > 0) lanes_fly(&l->flight, &l->draws, &l->under_way, &l->result, tired ? 0 : busy * CLUME_LANES_ENOUGH / 16, &l->above, SCENE);
+    vint ended = *out & vnot(l->under_way);
+    *out = l->under_way;
+    const vuint tentative = vselect(l->flight.draw % (vuint)CLUME_FLIGHT_DRAWS, (vuint)CLUME_FLIGHT_DRAWS, l->result == (vint)FLIGHT_PAUSED);
+    *events += (int)lanes_total(vselect((vuint)0u, 1u + TENTATIVE_EVENTS(tentative), ended));
+#if LANE_SHADOWS
+    const vint shadow = ended & l->shadow;
+    if (vany(shadow)) lanes_lit(l, shadow & (l->result != (vint)FLIGHT_PAUSED));
+    *waiting |= shadow;
+    ended &= vnot(shadow);
+#endif
+    const vint escaped = ended & (l->result == (vint)FLIGHT_ESCAPED), collided = ended & (l->result == (vint)FLIGHT_COLLIDED);
+    if (vany(escaped)) lanes_escape(l, escaped, SCENE);
+    if (vany(collided)) lanes_collide(l, collided, SCENE);
+    *events += (int)TENTATIVE_EVENTS(l->tentative);
+    l->tentative = 0;
+    *waiting |= ended & l->alive;
+    *over = ended & vnot(l->alive);
+    return true;
+}
+
+static void lanes_resume(Lanes* l, uint i, __global const PathState* s) {
+    ((float*)&l->flight.ox)[i] = s->origin.x;
+    ((float*)&l->flight.oy)[i] = s->origin.y;
+    ((float*)&l->flight.oz)[i] = s->origin.z;
+    ((float*)&l->flight.t)[i] = s->origin.w;
+    ((float*)&l->flight.dx)[i] = s->direction.x;
+    ((float*)&l->flight.dy)[i] = s->direction.y;
+    ((float*)&l->flight.dz)[i] = s->direction.z;
+    ((float*)&l->phase_pdf)[i] = s->direction.w;
+    for (int k = 0; k < CLUME_CHANNELS; ++k) {
+        ((float*)(l->beta + k))[i] = PARAM_CHANNEL(s->beta, k);
+        ((float*)(l->radiance + k))[i] = PARAM_CHANNEL(s->radiance, k);
+    }
+    ((uint*)&l->sample)[i] = s->sample;
+    ((uint*)&l->draws.depth)[i] = s->depth;
+    ((uint*)&l->flight.draw)[i] = s->draw;
+    ((uint*)&l->row)[i] = s->row;
+    ((int*)&l->alive)[i] = (s->flags & PATH_ALIVE) ? -1 : 0;
+    ((int*)&l->alpha)[i] = (s->flags & PATH_ALPHA) ? -1 : 0;
+}
+
+static void lanes_save(const Lanes* l, uint i, __global PathState* s) {
+    const LaneFlights* f = &l->flight;
+    s->origin = (float4)(lane_origin(f, i), LANE_OF(float, f->t, i));
+    s->direction = (float4)(lane_direction(f, i), LANE_OF(float, l->phase_pdf, i));
+    s->beta = (float4)(LANE_OF(float, l->beta[0], i), LANE_OF(float, l->beta[CLUME_CHANNELS / 2], i), LANE_OF(float, l->beta[CLUME_CHANNELS - 1], i), 0.0f);
+    s->radiance = (float4)(LANE_OF(float, l->radiance[0], i), LANE_OF(float, l->radiance[CLUME_CHANNELS / 2], i), LANE_OF(float, l->radiance[CLUME_CHANNELS - 1], i), 0.0f);
+    s->sample = LANE_OF(uint, l->sample, i);
+    s->depth = LANE_OF(uint, l->draws.depth, i);
+    s->draw = LANE_OF(uint, f->draw, i);
+    s->flags = (LANE_OF(int, l->alive, i) ? PATH_ALIVE : 0u) | (LANE_OF(int, l->alpha, i) ? PATH_ALPHA : 0u);
+    s->row = LANE_OF(uint, l->row, i);
+}
 
 #endif

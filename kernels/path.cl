@@ -174,3 +174,33 @@ static void path_event(Path* p, uint pixel, SCENE_ARGS) {
     p->flight.t = 0.0f;
     p->flight.draw = 0;
 }
+
+static void path_resume(Path* p, __global const PathState* s) {
+    p->o = s->origin.xyz;
+    p->flight.t = s->origin.w;
+    p->d = s->direction.xyz;
+    p->phase_pdf = s->direction.w;
+    p->beta = to_spectrum(s->beta);
+    p->radiance = to_spectrum(s->radiance);
+    p->sample = s->sample;
+    p->depth = s->depth;
+    p->flight.draw = s->draw;
+    p->flags = s->flags;
+}
+
+static void path_save(const Path* p, __global PathState* s) {
+    // One by one: what pads them is nobody's.
+    s->origin = (float4)(p->o, p->flight.t);
+    s->direction = (float4)(p->d, p->phase_pdf);
+#if CLUME_CHANNELS == 1
+    s->beta = (float4)(p->beta);
+    s->radiance = (float4)(p->radiance);
+#else
+    s->beta = (float4)(p->beta, 0.0f);
+    s->radiance = (float4)(p->radiance, 0.0f);
+#endif
+    s->sample = p->sample;
+    s->depth = p->depth;
+    s->draw = p->flight.draw;
+    s->flags = p->flags;
+}

@@ -140,7 +140,7 @@ __kernel void probe_flights(SCENE_ARGS, __global const float4* rays, __global fl
     for (uint i = 0; i < sizeof(LaneFlights) / sizeof(uint); ++i) ((uint*)&f)[i] = 0;  // idle lanes are computed with, too
     vfloat t_end = (vfloat)0.0f;
     vint flying = (vint)0, result = (vint)FLIGHT_ESCAPED, waiting = (vint)0;
-    vint above = (vint)0;
+    vuint above = (vuint)0u;
     for (;;) {
         for (int i = 0; i < CLUME_WIDTH; ++i) {
             if (LANE_OF(int, flying, i) || LANE_OF(int, waiting, i) || next == last) continue;
@@ -164,7 +164,7 @@ __kernel void probe_flights(SCENE_ARGS, __global const float4* rays, __global fl
         flying |= begun;
         const int busy = lanes_count(flying);
         if (busy > 0) lanes_fly(&f, &r, &flying, &result, busy * CLUME_LANES_ENOUGH / 16, &above, SCENE);
-        const vint ended = out_now & ~flying;
+        const vint ended = out_now & vnot(flying);
         waiting = ended & (result == (vint)FLIGHT_PAUSED);
         for (int i = 0; i < CLUME_WIDTH; ++i) {
             if (!LANE_OF(int, ended, i) || LANE_OF(int, waiting, i)) continue;

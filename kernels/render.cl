@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Entry point. A row of sums gathers a share of one pixel's samples; a work-item renders a row's, one after the other, or, with
+// Entry point, but for CLUME_POOL. A row of sums gathers a share of one pixel's samples; a work-item renders a row's, one after the other, or, with
 // CLUME_LANES, those of `rows_each` rows, CLUME_WIDTH paths side by side: lanes take the next sample of any of them as they come
 // free. After CLUME_LAUNCH_EVENTS events a row it saves its paths, counts itself in `unfinished`, and goes on in the next launch.
 #include "lane_path.cl"
 
-#if !CLUME_LANES
+#if CLUME_POOL
+#include "render_pool.cl"
+#elif !CLUME_LANES
 /// Adds what a work-item has gathered for one row of sums to what earlier launches left there, if any.
 static void sums_add(__global ulong* out, const ulong* sum, uint resume) {
     ulong carry = 0;
@@ -26,19 +28,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     p.sample = sample_begin + item / pixel_count;
     p.flags = 0;
     flight_clear(&p.flight);
-    if (resume) {
-        __global const PathState* s = states + item;
-        p.o = s->origin.xyz;
-        p.flight.t = s->origin.w;
-        p.d = s->direction.xyz;
-        p.phase_pdf = s->direction.w;
-        p.beta = to_spectrum(s->beta);
-        p.radiance = to_spectrum(s->radiance);
-        p.sample = s->sample;
-        p.depth = s->depth;
-        p.flight.draw = s->draw;
-        p.flags = s->flags;
-    }
+    if (resume) path_resume(&p, states + item);
     ulong sum[FILM_WORDS];
     for (int i = 0; i < FILM_WORDS; ++i) sum[i] = 0;
     uint events = 0;
@@ -64,20 +54,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
 #endif
     const bool more = p.sample < sample_end;
     if (more) {
-        __global PathState* s = states + item;  // one by one: what pads them is nobody's
-        s->origin = (float4)(p.o, p.flight.t);
-        s->direction = (float4)(p.d, p.phase_pdf);
-#if CLUME_CHANNELS == 1
-        s->beta = (float4)(p.beta);
-        s->radiance = (float4)(p.radiance);
-#else
-        s->beta = (float4)(p.beta, 0.0f);
-        s->radiance = (float4)(p.radiance, 0.0f);
-#endif
-        s->sample = p.sample;
-        s->depth = p.depth;
-        s->draw = p.flight.draw;
-        s->flags = p.flags;
+        path_save(&p, states + item);
         atomic_inc(unfinished);
     } else {
         // Others may go on in a launch to come: there this one must find itself done.
@@ -101,12 +78,13 @@ typedef struct {
 
 /// Lane i takes samples of a row from now on: those from `next` on.
 static void rows_enter(Rows* rows, uint i, uint index, uint next, const Share* share, __global const uint* pixels, __constant const RenderParams* params) {
-    const uint pixel = pixels[share->pixel_first + (share->first_row + index) % share->pixel_count], y = pixel / params->film_width;
+    const uint pixel = pixels[share->pixel_first + (share->first_row + index) % share->pixel_count];
+    const float2 corner = film_corner(pixel, params);
     ((uint*)&rows->index)[i] = index;
     ((uint*)&rows->pixel)[i] = pixel;
     ((uint*)&rows->next)[i] = next;
-    ((float*)&rows->x)[i] = (float)(pixel - y * params->film_width) - params->film_cx;
-    ((float*)&rows->y)[i] = (float)y - params->film_cy;
+    ((float*)&rows->x)[i] = corner.x;
+    ((float*)&rows->y)[i] = corner.y;
 }
 
 /// A row's first sample: every splits-th of the range from there is its own.
@@ -125,7 +103,7 @@ static vint lanes_assign(Lanes* l, Rows* rows, vint idle, const Share* share, __
     LANE_SET(l->film_y, rows->y, begun);
     LANE_SET(l->row, rows->index, begun);
     LANE_SET(rows->next, rows->next + share->splits, begun);
-    const vint rest = idle & ~begun;
+    const vint rest = idle & vnot(begun);
     if (!vany(rest) || !rows_left(rows, share)) return begun;
     for (uint i = 0; i < CLUME_WIDTH; ++i) {
         if (!LANE_OF(int, rest, i)) continue;
@@ -149,43 +127,6 @@ static vint lanes_assign(Lanes* l, Rows* rows, vint idle, const Share* share, __
     return begun;
 }
 
-static void lanes_resume(Lanes* l, uint i, __global const PathState* s) {
-    ((float*)&l->flight.ox)[i] = s->origin.x;
-    ((float*)&l->flight.oy)[i] = s->origin.y;
-    ((float*)&l->flight.oz)[i] = s->origin.z;
-    ((float*)&l->flight.t)[i] = s->origin.w;
-    ((float*)&l->flight.dx)[i] = s->direction.x;
-    ((float*)&l->flight.dy)[i] = s->direction.y;
-    ((float*)&l->flight.dz)[i] = s->direction.z;
-    ((float*)&l->phase_pdf)[i] = s->direction.w;
-    for (int k = 0; k < CLUME_CHANNELS; ++k) {
-        ((float*)(l->beta + k))[i] = PARAM_CHANNEL(s->beta, k);
-        ((float*)(l->radiance + k))[i] = PARAM_CHANNEL(s->radiance, k);
-    }
-    ((uint*)&l->sample)[i] = s->sample;
-    ((uint*)&l->draws.depth)[i] = s->depth;
-    ((uint*)&l->flight.draw)[i] = s->draw;
-    ((uint*)&l->row)[i] = s->row;
-    ((int*)&l->alive)[i] = (s->flags & PATH_ALIVE) ? -1 : 0;
-    ((int*)&l->alpha)[i] = (s->flags & PATH_ALPHA) ? -1 : 0;
-}
-
-static void lanes_save(const Lanes* l, const Rows* rows, uint i, __global PathState* s) {
-    const LaneFlights* f = &l->flight;
-    s->origin = (float4)(lane_origin(f, i), LANE_OF(float, f->t, i));
-    s->direction = (float4)(lane_direction(f, i), LANE_OF(float, l->phase_pdf, i));
-    s->beta = (float4)(LANE_OF(float, l->beta[0], i), LANE_OF(float, l->beta[CLUME_CHANNELS / 2], i), LANE_OF(float, l->beta[CLUME_CHANNELS - 1], i), 0.0f);
-    s->radiance = (float4)(LANE_OF(float, l->radiance[0], i), LANE_OF(float, l->radiance[CLUME_CHANNELS / 2], i), LANE_OF(float, l->radiance[CLUME_CHANNELS - 1], i), 0.0f);
-    s->sample = LANE_OF(uint, l->sample, i);
-    s->depth = LANE_OF(uint, l->draws.depth, i);
-    s->draw = LANE_OF(uint, f->draw, i);
-    s->flags = (LANE_OF(int, l->alive, i) ? PATH_ALIVE : 0u) | (LANE_OF(int, l->alpha, i) ? PATH_ALPHA : 0u);
-    s->row = LANE_OF(uint, l->row, i);
-    s->next_row = LANE_OF(uint, rows->index, i);
-    s->next = LANE_OF(uint, rows->next, i);
-    s->fresh = rows->fresh;
-}
-
 __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState* states, __global ulong* sums, __global uint* unfinished, uint pixel_first,
                      uint pixel_count, uint splits, uint sample_begin, uint sample_end, uint rows_each, uint resume) {
     const Share share = {(uint)get_global_id(0) * rows_each, pixel_first, pixel_count, splits, sample_begin, sample_end};
@@ -193,9 +134,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     states += (size_t)get_global_id(0) * CLUME_WIDTH;
     sums += (size_t)share.first_row * FILM_WORDS;
     Lanes l;
-    for (uint i = 0; i < sizeof(Lanes) / sizeof(uint); ++i) ((uint*)&l)[i] = 0;  // idle lanes are computed with, too
-    l.result = (vint)FLIGHT_ESCAPED;
-    l.draws.seed = (uint2)(params->seed_lo, params->seed_hi);
+    lanes_clear(&l, params);
     Rows rows;
     rows.index = rows.pixel = (vuint)0u;
     rows.next = (vuint)sample_end;
@@ -218,40 +157,15 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     for (;;) {
         const bool tired = events >= CLUME_LAUNCH_EVENTS * (int)rows_each;
         if (!tired) {
-            const vint idle = ~l.alive;
+            const vint idle = vnot(l.alive);
             if (vany(idle) && rows_left(&rows, &share)) {
                 const vint begun = lanes_assign(&l, &rows, idle, &share, pixels, params);
                 lanes_start(&l, begun, params);
                 waiting |= begun;
             }
         }
-        vint departing = tired ? (vint)0 : waiting;
-#if LANE_SHADOWS
-        departing |= waiting & l.shadow;  // paths are not saved amid a shadow ray
-#endif
-        lanes_depart(&l, departing, params, cells, lights);
-        out |= departing;
-        waiting &= ~departing;
-        if (!vany(out)) break;
-        const int busy = lanes_count(l.under_way);
-        if (busy > 0) lanes_fly(&l.flight, &l.draws, &l.under_way, &l.result, tired ? 0 : busy * CLUME_LANES_ENOUGH / 16, &l.above, SCENE);
-        vint ended = out & ~l.under_way;
-        out = l.under_way;
-        const vuint tentative = vselect(l.flight.draw % (vuint)CLUME_FLIGHT_DRAWS, (vuint)CLUME_FLIGHT_DRAWS, l.result == (vint)FLIGHT_PAUSED);
-        events += lanes_count(ended & -(1 + as_vint(TENTATIVE_EVENTS(tentative))));
-#if LANE_SHADOWS
-        const vint shadow = ended & l.shadow;
-        if (vany(shadow)) lanes_lit(&l, shadow & (l.result != (vint)FLIGHT_PAUSED));
-        waiting |= shadow;
-        ended &= ~shadow;
-#endif
-        const vint escaped = ended & (l.result == (vint)FLIGHT_ESCAPED), collided = ended & (l.result == (vint)FLIGHT_COLLIDED);
-        if (vany(escaped)) lanes_escape(&l, escaped, SCENE);
-        if (vany(collided)) lanes_collide(&l, collided, SCENE);
-        events += (int)TENTATIVE_EVENTS(l.tentative);
-        l.tentative = 0;
-        waiting |= ended & l.alive;
-        const vint over = ended & ~l.alive;
+        vint over;
+        if (!lanes_advance(&l, &waiting, &out, tired, &over, &events, SCENE)) break;
         if (!vany(over)) continue;
         for (int i = 0; i < CLUME_WIDTH; ++i) {
             if (!LANE_OF(int, over, i)) continue;
@@ -260,9 +174,14 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
             s[FILM_ALPHA] += LANE_OF(int, l.alpha, i) ? 1 : 0;
         }
     }
-    sums[FILM_VIOLATIONS] += l.violations + (uint)lanes_count(l.above);
+    sums[FILM_VIOLATIONS] += l.violations + lanes_total(l.above);
     sums[FILM_EXCESS] += l.excess;
     if (vany(l.alive) || rows_left(&rows, &share)) atomic_inc(unfinished);
-    for (uint i = 0; i < CLUME_WIDTH; ++i) lanes_save(&l, &rows, i, states + i);
+    for (uint i = 0; i < CLUME_WIDTH; ++i) {
+        lanes_save(&l, i, states + i);
+        states[i].next_row = LANE_OF(uint, rows.index, i);
+        states[i].next = LANE_OF(uint, rows.next, i);
+        states[i].fresh = rows.fresh;
+    }
 }
 #endif

@@ -31,6 +31,8 @@ struct DeviceInfo {  // NOLINT(bugprone-exception-escape): cl::Device says noexc
 
     /// "name (p0d1)": what messages call it; sub-devices stay distinct.
     std::string label() const;
+    /// Work-items of a work-group that suit its kernels: a CPU's cores take groups as they come free, a GPU's need full warps.
+    std::size_t group_size() const { return type == "gpu" ? 64 : 8; }
     /// PoCL has its own program cache and mustn't be asked for binaries.
     bool is_pocl() const;
 };

@@ -13,7 +13,7 @@
 namespace clume {
 namespace {
 
-constexpr std::size_t kLocalSize = 8;  // rows of sums that a work-group fills, or as many as one work-item does
+constexpr std::size_t kMostInPool = std::size_t{1} << 31;  // paths, counted in 32 bits
 constexpr std::size_t kSamplesPerLane = 64;  // that a work-item has at least, so that few of its lanes idle at its end
 constexpr std::size_t kItemsPerUnit = 16;    // at least, if there are rows enough: work-items differ in length
 constexpr std::size_t kFewestItems = 64;  // of a piece: a device without room for these is of no use
@@ -43,8 +43,10 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
       params_(scene.params),
       scene_(queue_, scene),
       pixels_(queue_, pixels),
-      unfinished_(queue_, 1),
+      progress_(queue_, 2),
       raised_(scene.learned.size(), 0.0f),
+      pool_(vector_width_of(info, vector_width) == 1),
+      zeroed_(pool_ || scene.lanes),
       lanes_(scene.lanes ? static_cast<std::size_t>(vector_width_of(info, vector_width)) : 1),
       wanted_items_(items_wanted(info)),
       units_(std::max(1u, info.compute_units)) {
@@ -62,7 +64,8 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene,
         states_ = Buffer<device::PathState>(queue_, lanes_);
         sums_ = Buffer<std::uint64_t>(queue_, FILM_WORDS);
         sums_.upload(std::vector<std::uint64_t>(FILM_WORDS));
-        set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(0), cl_uint(1), cl_uint(1), cl_uint(0), cl_uint(0), cl_uint(lanes_), cl_uint(0));
+        set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, progress_, cl_uint(0), cl_uint(1), cl_uint(1), cl_uint(0), cl_uint(0), cl_uint(pool_ ? 1 : lanes_), cl_uint(0));
+        progress_.upload(std::vector<device::uint>(2));
         launch(1);
     }
 }
@@ -72,7 +75,7 @@ std::uint64_t DeviceRenderer::batch_bytes(const DeviceInfo& info, const std::vec
     return items * (sizeof(device::PathState) + 2 * FILM_WORDS * sizeof(std::uint64_t));
 }
 
-void DeviceRenderer::launch(std::size_t items) { queue_.launch(kernel_, items, std::max<std::size_t>(1, kLocalSize / lanes_)); }
+void DeviceRenderer::launch(std::size_t items) { queue_.launch(kernel_, items, std::max<std::size_t>(1, queue_.info().group_size() / lanes_)); }
 
 std::size_t DeviceRenderer::rows_per_item(std::size_t rows, std::size_t samples) const {
     if (lanes_ == 1) return 1;
@@ -117,31 +120,33 @@ void DeviceRenderer::upload_changes() {
 }
 
 DeviceRenderer::Piece DeviceRenderer::render(std::size_t first, std::size_t count, std::uint32_t begin, std::uint32_t end) {
-    const std::size_t wanted = std::min(wanted_items_, most_items_);
-    Piece piece{first, count, std::clamp<std::size_t>(wanted / count, 1, end - begin), {}};
-    const std::size_t rows = count * piece.splits, rows_each = rows_per_item(rows, (end - begin) / piece.splits), items = (rows + rows_each - 1) / rows_each;
+    const std::size_t wanted = std::min(wanted_items_, most_items_), samples = end - begin;
+    Piece piece{first, count, pool_ ? 1 : std::clamp<std::size_t>(wanted / count, 1, samples), {}};
+    const std::size_t rows = count * piece.splits, rows_each = rows_per_item(rows, samples / piece.splits);
+    const std::size_t items = pool_ ? std::min(wanted, count * samples) : (rows + rows_each - 1) / rows_each;
     if (states_.size() < items * lanes_ || sums_.size() < rows * FILM_WORDS) {
         states_ = {};
         sums_ = {};
         states_ = Buffer<device::PathState>(queue_, items * lanes_);
         sums_ = Buffer<std::uint64_t>(queue_, rows * FILM_WORDS);
     }
-    // Lanes add to their rows. By the host: Oclgrind does not know buffers that kernels or fills have made.
-    if (lanes_ > 1) sums_.upload(std::vector<std::uint64_t>(rows * FILM_WORDS));
+    // By the host: Oclgrind does not know buffers that kernels or fills have made.
+    if (zeroed_) sums_.upload(std::vector<std::uint64_t>(rows * FILM_WORDS));
+    progress_.upload(std::vector<device::uint>(2));
     cl_uint resume = 0;
     for (;;) {
-        const device::uint none = 0;
-        unfinished_.upload(std::span(&none, 1));
-        set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, unfinished_, cl_uint(first), cl_uint(count), cl_uint(piece.splits), cl_uint(begin),
-                 cl_uint(end), cl_uint(rows_each), resume);
+        set_args(queue_, kernel_, kFirstBatchArg, states_, sums_, progress_, cl_uint(first), cl_uint(count), cl_uint(piece.splits), cl_uint(begin),
+                 cl_uint(end), cl_uint(pool_ ? items : rows_each), resume);
         launch(items);
         device::uint left = 0;
-        unfinished_.download(std::span(&left, 1));
+        progress_.download(std::span(&left, 1));
         alive();
         if (left == 0) break;
         if (left > items) throw DeviceError(queue_.label() + " gives nonsense: " + std::to_string(left) + " of " + std::to_string(items) + " work-items are unfinished");
         check_work(rows);
         if (unwanted()) throw BatchAbandoned();
+        const device::uint none = 0;
+        progress_.upload(std::span(&none, 1));
         resume = 1;
     }
     piece.sums.resize(rows * FILM_WORDS);
@@ -161,12 +166,13 @@ void DeviceRenderer::run(const Batch& batch) {
     pieces_.clear();
     upload_changes();
     for (std::size_t done = 0; done < tile.count;) {
-        const std::size_t count = std::min<std::size_t>(tile.count - done, most_items_);
+        const std::size_t fitting = std::max<std::size_t>(1, kMostInPool / std::max(1u, batch.end - batch.begin));
+        const std::size_t count = std::min({std::size_t{tile.count} - done, most_items_, pool_ ? fitting : SIZE_MAX});
         try {
             pieces_.push_back(render(tile.first + done, count, batch.begin, batch.end));
             done += count;
         } catch (const DeviceMemoryError&) {
-            const std::size_t tried = count * std::clamp<std::size_t>(std::min(wanted_items_, most_items_) / count, 1, batch.end - batch.begin);
+            const std::size_t most = std::min(wanted_items_, most_items_), tried = pool_ ? std::max(count, most) : count * std::clamp<std::size_t>(most / count, 1, batch.end - batch.begin);
             if (tried <= kFewestItems) throw;
             most_items_ = short_of_memory_ = std::max(kFewestItems, tried / 2);
             states_ = {};

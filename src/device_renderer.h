@@ -84,7 +84,7 @@ private:
     Buffer<device::uint> pixels_;
     Buffer<device::PathState> states_;
     Buffer<std::uint64_t> sums_;
-    Buffer<device::uint> unfinished_;
+    Buffer<device::uint> progress_;  ///< unfinished work-items, paths of the pool that have been begun
     cl::Kernel kernel_;
     std::vector<Piece> pieces_;              ///< of the batch last run
     std::vector<float> learned_;             ///< to be uploaded
@@ -92,6 +92,8 @@ private:
     std::vector<float> raised_;
     bool aimed_ = false;                     ///< params_ are on the device
     bool chosen_ = true;                     ///< so are the pixels in their order
+    bool pool_;                              ///< work-items take their paths from a pool
+    bool zeroed_;                            ///< they add to the rows of sums, which are 0 before
     std::size_t lanes_;                      ///< paths that a work-item has side by side
     std::size_t wanted_items_;               ///< rows that keep the device busy
     std::size_t units_;                      ///< compute units

@@ -13,7 +13,6 @@
 namespace clume {
 namespace {
 
-constexpr std::size_t kLocalSize = 8;
 
 /// A queue and a program that probes with equal options share: code is generated once per program.
 struct Compiled {
@@ -62,7 +61,8 @@ struct Probe::Impl {
     }
 
     template <class SetArgs>
-    double launch(const char* name, std::size_t items, const SetArgs& set, std::size_t local = kLocalSize) {
+    double launch(const char* name, std::size_t items, const SetArgs& set, std::size_t local = 0) {
+        if (local == 0) local = queue.info().group_size();
         const bool first = code.kernels.find(name) == code.kernels.end();
         if (first) code.kernels.emplace(name, make_kernel(queue, code.program, name));
         cl::Kernel& kernel = code.kernels.at(name);
@@ -98,16 +98,20 @@ ProbeRun<ProbeHit> Probe::rays(std::span<const ProbeRay> rays, std::uint32_t sam
 }
 
 ProbeRun<ProbeHit> Probe::flights(std::span<const ProbeRay> r, std::uint32_t sample) {
-    if (!impl_->lanes || width_ == 1) return rays(r, sample, 1);
+    if (!impl_->lanes) return single_flights(r, sample);
     Impl& s = *impl_;
-    const std::size_t each = 64 * static_cast<std::size_t>(width_);  // as the renderer's work-items: lanes idle at the end of each
+    // As the renderer's work-items: lanes idle at the end of each. All the units of a GPU have some.
+    const DeviceInfo& info = s.queue.info();
+    const bool gpu = info.type == "gpu";
+    const std::size_t each = gpu ? std::clamp<std::size_t>(r.size() / (std::size_t{1024} * info.compute_units), 1, 64) : 64 * static_cast<std::size_t>(width_);
     Buffer<ProbeRay> in(s.queue, r);
     Buffer<ProbeHit> out(s.queue, r.size());
     ProbeRun<ProbeHit> result;
-    result.device_s = s.launch("probe_flights", (r.size() + each - 1) / each, [&](cl::Kernel& kernel) { s.bind(kernel, in, out, cl_uint(r.size()), cl_uint(sample), cl_uint(each)); }, 1);
+    result.device_s = s.launch("probe_flights", (r.size() + each - 1) / each, [&](cl::Kernel& kernel) { s.bind(kernel, in, out, cl_uint(r.size()), cl_uint(sample), cl_uint(each)); }, gpu ? info.group_size() : 1);
     result.values = out.download();
     return result;
 }
+ProbeRun<ProbeHit> Probe::single_flights(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 1); }
 ProbeRun<ProbeHit> Probe::transmittances(std::span<const ProbeRay> r) { return rays(r, 0, 2); }
 ProbeRun<ProbeHit> Probe::roulette_transmittances(std::span<const ProbeRay> r, std::uint32_t sample) { return rays(r, sample, 4); }
 

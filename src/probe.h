@@ -86,6 +86,8 @@ public:
 
     /// Free flights by the program's strategy; ray i draws as pixel i, sample `sample`.
     ProbeRun<ProbeHit> flights(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
+    /// The same, never side by side in a work-item.
+    ProbeRun<ProbeHit> single_flights(std::span<const ProbeRay> rays, std::uint32_t sample = 0);
     /// Exact transmittances up to t_end.
     ProbeRun<ProbeHit> transmittances(std::span<const ProbeRay> rays);
     /// Transmittances up to t_end by the program's estimator.

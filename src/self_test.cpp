@@ -59,7 +59,7 @@ std::string wrong_words(Queue& queue, const cl::Program& program, cl_uint seed) 
     cl::Kernel kernel = make_kernel(queue, program, "probe_words");
     Buffer<cl_uint> out(queue, 4 * n);
     set_args(queue, kernel, 0, out, n, seed);
-    queue.launch(kernel, n, 8);
+    queue.launch(kernel, n, queue.info().group_size());
     const std::vector<cl_uint> got = out.download();
     for (cl_uint i = 0; i < n; ++i) {
         const auto expected = words_of(i, seed);
@@ -110,7 +110,7 @@ SelfTestResult self_test(const DeviceInfo& info, int vector_width) {
         for (std::size_t i = 0; i < n; ++i) x[i] = check.lo + (check.hi - check.lo) * static_cast<float>(i) / static_cast<float>(n - 1);
         Buffer<float> bx(queue, x), out(queue, n);
         set_args(queue, math, 0, bx, bx, out, cl_uint(n), check.function);
-        queue.launch(math, n, 8);
+        queue.launch(math, n, info.group_size());
         const std::vector<float> y = out.download();
         for (std::size_t i = 0; i < n; ++i) {
             const double expected = check.host(static_cast<double>(x[i]));

@@ -14,7 +14,6 @@
 namespace clume {
 namespace {
 
-constexpr std::size_t kLocalSize = 8;
 
 }  // namespace
 
@@ -37,7 +36,7 @@ struct StressDevice::Impl {
         cl::Kernel& kernel = found->second;
         if (scene) scene->bind(queue, kernel);
         set_args(queue, kernel, scene ? SceneBuffers::kArgs : 0, args...);
-        queue.launch(kernel, items, kLocalSize);
+        queue.launch(kernel, items, queue.info().group_size());
     }
 
     Queue queue;

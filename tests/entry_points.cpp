@@ -281,7 +281,7 @@ Outputs run_method(const DeviceInfo& device, int width, const Scene& scene, cons
         const std::vector<ProbeRay> rays = random_rays(count, 21);
         const auto flights = probe.flights(rays, 1).values;
         keep(out, "probe_ray flight " + name, flights);
-        if (s.lanes && width != 1) keep(out, "probe_flights " + name, flights);  // that kernel made them
+        if (s.lanes) keep(out, "probe_flights " + name, flights);  // that kernel made them
         keep(out, "probe_ray transmittance " + name, probe.transmittances(rays).values);
         keep(out, "probe_ray estimate " + name, probe.estimated_transmittances(rays, 2).values);
         keep(out, "probe_ray roulette " + name, probe.roulette_transmittances(rays, 3).values);

@@ -155,7 +155,9 @@ TEST_CASE("Flights.AcceleratorsAndWidthsGiveTheSameBits", "[kernels]") {
     CHECK(collided < 3200);
     const DeviceScene packed = device_scene(scene, "delta", "auto");
     const auto wide = Probe(test_device(), packed, 16).flights(rays, 3).values;
-    CHECK(first_difference(wide, Probe(test_device(), packed, 1).flights(rays, 3).values) == rays.size());
+    Probe narrow(test_device(), packed, 1);
+    CHECK(first_difference(wide, narrow.flights(rays, 3).values) == rays.size());
+    CHECK(first_difference(wide, narrow.single_flights(rays, 3).values) == rays.size());
 }
 
 TEST_CASE("Flights.IdenticalPrimitivesShareTheirDensity", "[kernels]") {

@@ -29,7 +29,7 @@ LintResult lint(const std::string& source, const std::string& defines) {
         std::filesystem::temp_directory_path() / ("clume-lint-" + std::to_string(getpid()) + ".cl");
     std::ofstream(file) << source;
     const std::string command =
-        "clang -x cl -cl-std=CL1.2 --target=spir64 -fsyntax-only -Wall -Werror " + defines + " '" + file.string() + "' 2>&1";
+        "clang -x cl -cl-std=CL1.2 --target=spir64 -fsyntax-only -Wall -Wpedantic -Werror " + defines + " '" + file.string() + "' 2>&1";
     LintResult result;
     std::FILE* pipe = popen(command.c_str(), "r");
     REQUIRE(pipe != nullptr);
@@ -104,4 +104,5 @@ TEST_CASE("Kernels.LintFindsWhatOpenClForbids") {
     CHECK_FALSE(lint("__kernel void k(__global float* a) { int unused; a[0] = 1; }\n", "").passed);
     CHECK_FALSE(lint("__kernel void k(__global float* a) { a[0] = nosuchfunction(1); }\n", "").passed);
     CHECK_FALSE(lint("__kernel void k(float* a) { a[0] = 1; }\n", "").passed);
+    CHECK_FALSE(lint("#define F(...) fma(__VA_ARGS__)\n__kernel void k(__global float* a) { a[0] = F(a[0], a[1], 1.0f); }\n", "").passed);
 }

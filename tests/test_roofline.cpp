@@ -183,7 +183,7 @@ TEST_CASE("Roofline.SortsSort", "[kernels]") {
             const Buffer<std::uint32_t> id_out(queue, in.size());
             cl::Kernel kernel = make_kernel(queue, program, name);
             set_args(queue, kernel, 0, from, t_out, id_out, cl_uint(lists), cl_uint(lists));
-            queue.launch(kernel, lists, 8);
+            queue.launch(kernel, lists, queue.info().group_size());
             const std::vector<float> t = t_out.download();
             const std::vector<std::uint32_t> id = id_out.download();
             INFO(name << " of " << n);
