@@ -95,9 +95,18 @@ void measure(Session& session, const Shared& shared) {
         if (halves) confined.emplace(k == 0 ? 0 : shared.devices[0].compute_units, shared.devices[k].compute_units);
         return speed({all[k]}, count);
     };
-    // As many samples as make a turn long beside a batch.
+    // As many samples as make a turn long beside a batch: found step by step, since a GPU's first batches are far too small for it.
+    const double turn_s = session.options().quick ? 0.2 : 2.0;
     std::vector<std::uint32_t> samples;
-    for (std::size_t k = 0; k < all.size(); ++k) samples.push_back(static_cast<std::uint32_t>(std::clamp((session.options().quick ? 0.2 : 2.0) * speed_alone(k, 2) / static_cast<double>(pixels.size()), 2.0, 4096.0)));
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        double count = 2, wanted = 0;
+        for (;;) {
+            wanted = std::clamp(turn_s * speed_alone(k, static_cast<std::uint32_t>(count)) / static_cast<double>(pixels.size()), 2.0, 65536.0);
+            if (wanted < 4 * count) break;
+            count = std::min(wanted, 16 * count);
+        }
+        samples.push_back(static_cast<std::uint32_t>(wanted));
+    }
     std::vector<double> together, share;
     std::vector<std::vector<double>> alone(all.size());
     for (int round = -1; round < session.rounds(7); ++round) {

@@ -123,10 +123,10 @@
 #define CLUME_LANES_STEPPING 7
 #endif
 #ifndef CLUME_LANES_STEPS  // of CLUME_WIDTH 1: steps between cells before its neighbours' collisions are looked after
-#define CLUME_LANES_STEPS 4
+#define CLUME_LANES_STEPS 2
 #endif
 #ifndef CLUME_LANES_ROUNDS  // of CLUME_WIDTH 1: collisions before its neighbours' flights that ended are looked after
-#define CLUME_LANES_ROUNDS 8
+#define CLUME_LANES_ROUNDS 4
 #endif
 
 #define CONCAT_(a, b) a##b

@@ -2,6 +2,9 @@
 // Context, queue and launches of one device; cl::Error leaves as DeviceError.
 #include "runtime/queue.h"
 
+#include <map>
+#include <memory>
+#include <mutex>
 #include <utility>
 
 #include "runtime/check.h"
@@ -27,12 +30,26 @@ cl::Event start(const cl::CommandQueue& queue, const std::string& label, const c
     }
 }
 
+/// The context for a queue. A GPU takes long to make one, and much memory: its queues share the one that the first has made and the
+/// last takes along. A CPU's are their own: Oclgrind 21.10 mixes up what the programs of one context have initialised.
+std::shared_ptr<const cl::Context> context_for(const DeviceInfo& info) {
+    const auto make = [&] { return std::make_shared<const cl::Context>(info.device); };
+    if (info.type != "gpu") return make();
+    static std::mutex mutex;
+    static std::map<cl_device_id, std::weak_ptr<const cl::Context>> contexts;
+    const std::lock_guard lock(mutex);
+    std::weak_ptr<const cl::Context>& known = contexts[info.device()];
+    std::shared_ptr<const cl::Context> context = known.lock();
+    if (!context) known = context = make();
+    return context;
+}
+
 }  // namespace
 
 Queue::Queue(DeviceInfo info) : info_(std::move(info)), label_(info_.label()) {
     checked(label_, [&] {
-        context_ = cl::Context(info_.device);
-        queue_ = cl::CommandQueue(context_, info_.device, CL_QUEUE_PROFILING_ENABLE);
+        context_ = context_for(info_);
+        queue_ = cl::CommandQueue(*context_, info_.device, CL_QUEUE_PROFILING_ENABLE);
     });
 }
 
@@ -60,13 +77,16 @@ void Queue::finish() {
 }
 
 cl::Buffer Queue::allocate(std::size_t byte_size, cl_mem_flags flags) const {
+    const std::string detail = std::to_string(byte_size) + " bytes asked for, the device gives at most " + std::to_string(info_.max_allocation) +
+                               " at once of " + std::to_string(info_.global_memory);
+    const auto short_of_memory = [&](const char* call, cl_int code) { return DeviceMemoryError(std::string(call) + ": " + error_code_name(code) + " on " + label_ + " (" + detail + ")"); };
+    // Drivers that allocate at the first use take any size.
+    if (byte_size > info_.global_memory) throw short_of_memory("clCreateBuffer", CL_INVALID_BUFFER_SIZE);
     try {
-        return cl::Buffer(context_, flags, byte_size);
+        return cl::Buffer(*context_, flags, byte_size);
     } catch (const cl::Error& error) {
-        const std::string detail = std::to_string(byte_size) + " bytes asked for, the device gives at most " + std::to_string(info_.max_allocation) +
-                                   " at once of " + std::to_string(info_.global_memory);
-        if (error.err() == CL_OUT_OF_RESOURCES || error.err() == CL_INVALID_BUFFER_SIZE)  // of an allocation, these mean memory
-            throw DeviceMemoryError(std::string(error.what()) + ": " + error_code_name(error.err()) + " on " + label_ + " (" + detail + ")");
+        // Of an allocation, these mean memory.
+        if (error.err() == CL_OUT_OF_RESOURCES || error.err() == CL_INVALID_BUFFER_SIZE) throw short_of_memory(error.what(), error.err());
         throw_device_error(error, label_, detail);
     }
 }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// One device made ready: its context and one in-order, profiled queue. One thread uses a Queue at a time.
-// Kernels and buffers made on it may outlive it (OpenCL counts references).
+// One device made ready: its context, shared by the queues of a GPU, and one in-order, profiled queue. One thread uses a
+// Queue at a time. Kernels and buffers made on it may outlive it (OpenCL counts references).
 #pragma once
 
 #include <CL/opencl.hpp>
 #include <cstddef>
+#include <memory>
 #include <string>
 
 #include "runtime/device.h"
@@ -19,7 +20,7 @@ public:
 
     const DeviceInfo& info() const { return info_; }
     const std::string& label() const { return label_; }  ///< what errors call the device
-    const cl::Context& context() const { return context_; }
+    const cl::Context& context() const { return *context_; }
     const cl::CommandQueue& queue() const { return queue_; }
 
     /// Enqueues `global` work-items, padded up to a multiple of `local` (kernels check their bounds), and returns at once.
@@ -36,7 +37,7 @@ public:
 private:
     DeviceInfo info_;
     std::string label_;
-    cl::Context context_;
+    std::shared_ptr<const cl::Context> context_;
     cl::CommandQueue queue_;
 };
 

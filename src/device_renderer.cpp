@@ -131,7 +131,7 @@ DeviceRenderer::Piece DeviceRenderer::render(std::size_t first, std::size_t coun
         sums_ = Buffer<std::uint64_t>(queue_, rows * FILM_WORDS);
     }
     // By the host: Oclgrind does not know buffers that kernels or fills have made.
-    if (zeroed_) sums_.upload(std::vector<std::uint64_t>(rows * FILM_WORDS));
+    if (zeroed_) sums_.zero();
     progress_.upload(std::vector<device::uint>(2));
     cl_uint resume = 0;
     for (;;) {

@@ -33,7 +33,7 @@ double seconds_since(Clock::time_point t) { return std::chrono::duration<double>
 /// Tiles of the active pixels, no larger than keeps all devices busy: small ones for CPUs, large ones for GPUs.
 std::vector<Tile> make_tiles(std::size_t pixels, const std::vector<DeviceInfo>& devices) {
     const bool gpu = std::any_of(devices.begin(), devices.end(), [](const DeviceInfo& d) { return d.type == "gpu"; });
-    const std::size_t size = std::size_t{1} << (gpu ? 16 : 13);
+    const std::size_t size = std::size_t{1} << (gpu ? 14 : 13);
     std::vector<Tile> tiles;
     for (std::size_t first = 0; first < pixels; first += size)
         tiles.push_back({static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(std::min(size, pixels - first))});
