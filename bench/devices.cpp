@@ -74,9 +74,10 @@ void measure(Session& session, const Shared& shared) {
     std::vector<Tile> tiles;
     for (std::uint32_t first = 0; first < pixels.size(); first += 1024) tiles.push_back({first, std::min<std::uint32_t>(1024, static_cast<std::uint32_t>(pixels.size()) - first)});
     FilmSums film(pixels.size(), 1, static_cast<double>(device.params.film_scale));
+    const auto shared_scene = std::make_shared<const DeviceScene>(device);
     Workers all;
     for (const DeviceInfo& d : shared.devices) {
-        all.push_back(std::make_shared<DeviceRenderer>(d, device, pixels, tiles, session.options().width));
+        all.push_back(std::make_shared<DeviceRenderer>(d, shared_scene, pixels, tiles, session.options().width));
         static_cast<DeviceRenderer&>(*all.back()).aim(film, 1);
     }
     std::uint32_t next = 0;

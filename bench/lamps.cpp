@@ -58,7 +58,7 @@ struct Side {
         : device(make_device_scene(scene, session.render_options())) {
         for (auto& [name, value] : device.defines)
             if (name == "CLUME_LAMPS" && !lamps) value = "0";
-        renderer = std::make_unique<DeviceRenderer>(session.device(), device, pixels, tiles, session.options().width);
+        renderer = std::make_unique<DeviceRenderer>(session.device(), std::make_shared<const DeviceScene>(device), pixels, tiles, session.options().width);
     }
     /// Seconds that it took.
     double round(const std::vector<device::uint>& pixels, std::uint64_t seed, std::uint32_t spp, bool keep) {

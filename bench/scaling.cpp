@@ -48,7 +48,7 @@ Point measure(Session& session, const std::string& item, Scene scene) {
     const auto pixels = active_pixels(scene, device, {0, 0, scene.film.width, scene.film.height});
     const std::vector<Tile> tiles{{0, static_cast<std::uint32_t>(pixels.size())}};
     FilmSums film(pixels.size(), 1, static_cast<double>(device.params.film_scale));
-    DeviceRenderer renderer(session.device(), device, pixels, tiles, session.options().width);
+    DeviceRenderer renderer(session.device(), std::make_shared<const DeviceScene>(std::move(device)), pixels, tiles, session.options().width);
     renderer.aim(film, scene.render.seed);
     std::uint32_t spp = 1, next = 0;
     std::vector<double> us;

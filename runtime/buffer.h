@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "runtime/check.h"
+#include "runtime/host_array.h"
 #include "runtime/queue.h"
 
 namespace clume {
@@ -36,6 +37,14 @@ public:
     }
     Buffer(const Queue& queue, const std::vector<T>& data, cl_mem_flags flags = CL_MEM_READ_ONLY)
         : Buffer(queue, std::span<const T>(data), flags) {}
+    /// `data` to be read by kernels: on a CPU where it lies, so that it must outlive the buffer; elsewhere a copy.
+    Buffer(const Queue& queue, const HostArray<T>& data) : queue_(queue.queue()), label_(queue.label()), size_(data.size()) {
+        if (data.empty() || queue.info().type != "cpu") {
+            *this = Buffer(queue, std::span<const T>(data));
+        } else {
+            memory_ = queue.allocate(byte_size(), CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, const_cast<T*>(data.data()));  // NOLINT(cppcoreguidelines-pro-type-const-cast): OpenCL has no other way
+        }
+    }
     Buffer(Buffer&&) noexcept = default;
     /// By exchange: what was held is released by a destructor, which a device that fails even then cannot make throw.
     Buffer& operator=(Buffer&& other) noexcept {  // NOLINT(bugprone-exception-escape): only nothing is released amid a swap

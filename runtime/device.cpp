@@ -48,7 +48,7 @@ DeviceInfo describe(const cl::Device& device, const cl::Platform& platform, cons
     info.name = trimmed(device.getInfo<CL_DEVICE_NAME>());
     info.id = index + "-" + slug_of(info.name);
     const cl_device_type type = device.getInfo<CL_DEVICE_TYPE>();
-    info.type = (type & CL_DEVICE_TYPE_GPU) ? "gpu" : (type & CL_DEVICE_TYPE_CPU) ? "cpu" : "accelerator";
+    info.type = (type & CL_DEVICE_TYPE_CPU) ? "cpu" : (type & CL_DEVICE_TYPE_GPU) ? "gpu" : "accelerator";  // a simulator says it is all of them
     info.driver = trimmed(device.getInfo<CL_DRIVER_VERSION>());
     info.version = trimmed(device.getInfo<CL_DEVICE_VERSION>());
     info.compute_units = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();

@@ -76,14 +76,14 @@ void Queue::finish() {
     checked(label_, [&] { queue_.finish(); });
 }
 
-cl::Buffer Queue::allocate(std::size_t byte_size, cl_mem_flags flags) const {
+cl::Buffer Queue::allocate(std::size_t byte_size, cl_mem_flags flags, void* host) const {
     const std::string detail = std::to_string(byte_size) + " bytes asked for, the device gives at most " + std::to_string(info_.max_allocation) +
                                " at once of " + std::to_string(info_.global_memory);
     const auto short_of_memory = [&](const char* call, cl_int code) { return DeviceMemoryError(std::string(call) + ": " + error_code_name(code) + " on " + label_ + " (" + detail + ")"); };
     // Drivers that allocate at the first use take any size.
     if (byte_size > info_.global_memory) throw short_of_memory("clCreateBuffer", CL_INVALID_BUFFER_SIZE);
     try {
-        return cl::Buffer(*context_, flags, byte_size);
+        return cl::Buffer(*context_, flags, byte_size, host);
     } catch (const cl::Error& error) {
         // Of an allocation, these mean memory.
         if (error.err() == CL_OUT_OF_RESOURCES || error.err() == CL_INVALID_BUFFER_SIZE) throw short_of_memory(error.what(), error.err());

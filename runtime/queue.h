@@ -31,8 +31,9 @@ public:
     void flush();   ///< starts what is enqueued
     void finish();  ///< waits for it; throws DeviceError if a command failed
 
-    /// Device memory; the DeviceMemoryError of a failure tells bytes asked for and the most the device gives.
-    cl::Buffer allocate(std::size_t byte_size, cl_mem_flags flags) const;
+    /// Device memory, or `host` memory if the flags say so; the DeviceMemoryError of a failure tells bytes asked for and the most the
+    /// device gives.
+    cl::Buffer allocate(std::size_t byte_size, cl_mem_flags flags, void* host = nullptr) const;
 
 private:
     DeviceInfo info_;

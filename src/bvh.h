@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernels/layout.h"
+#include "runtime/host_array.h"
 #include "src/ellipsoid.h"
 
 namespace clume {
@@ -31,7 +32,7 @@ BvhTree build_bvh(std::span<const Ellipsoid> ellipsoids);
 
 /// The 8-wide form: nodes and, per group, its at most 16 primitives (one family and medium each: a mixed leaf is split).
 struct WideBvh {
-    std::vector<device::BvhNode> nodes;
+    HostArray<device::BvhNode> nodes;
     std::vector<std::vector<std::uint32_t>> groups;
     std::uint32_t stack_entries = 0;  ///< most that a traversal can need
 };

@@ -8,7 +8,6 @@
 
 #include "runtime/program.h"
 #include "src/error.h"
-#include "src/work_weights.h"
 
 namespace clume {
 namespace {
@@ -23,37 +22,30 @@ std::size_t items_wanted(const DeviceInfo& info) {
     return info.type == "gpu" ? std::size_t{2048} * info.compute_units : std::size_t{128} * std::max(1u, info.compute_units);
 }
 
-double work_of(std::span<const std::uint64_t> sums) {
-    double ns = 0;
-    for (std::size_t row = 0; row < sums.size(); row += FILM_WORDS)
-        for (std::size_t k = 0; k < WORK_KINDS; ++k) ns += work_weights_ns[k] * static_cast<double>(sums[row + FILM_WORK + k]);
-    return ns;
-}
-
 }  // namespace
 
 int vector_width_of(const DeviceInfo& info, int wanted) { return wanted > 0 ? wanted : static_cast<int>(info.native_vector_width); }
 
-DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene, const std::vector<device::uint>& pixels,
+DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const std::shared_ptr<const DeviceScene>& scene, const std::vector<device::uint>& pixels,
                                const std::vector<Tile>& tiles, int vector_width, bool optimised)
     : queue_(info),
       active_(pixels),
       order_(pixels.size()),
       tiles_(tiles),
-      params_(scene.params),
+      params_(scene->params),
       scene_(queue_, scene),
       pixels_(queue_, pixels),
       progress_(queue_, 2),
-      raised_(scene.learned.size(), 0.0f),
+      raised_(scene->learned.size(), 0.0f),
       pool_(vector_width_of(info, vector_width) == 1),
-      zeroed_(pool_ || scene.lanes),
-      lanes_(scene.lanes ? static_cast<std::size_t>(vector_width_of(info, vector_width)) : 1),
+      zeroed_(pool_ || scene->lanes),
+      lanes_(scene->lanes ? static_cast<std::size_t>(vector_width_of(info, vector_width)) : 1),
       wanted_items_(items_wanted(info)),
       units_(std::max(1u, info.compute_units)) {
     std::iota(order_.begin(), order_.end(), 0u);
     ProgramOptions options;
-    options.optimised = optimised;
-    for (const auto& [name, value] : scene.defines) options.define(name, value);
+    options.optimised = optimised || info.type == "gpu";  // there code is made soon, and slow without
+    for (const auto& [name, value] : scene->defines) options.define(name, value);
     options.define("CLUME_WIDTH", vector_width_of(info, vector_width));
     const cl::Program program = build_program(queue_, "render.cl", options);
     kernel_ = make_kernel(queue_, program, "render");
@@ -154,11 +146,18 @@ DeviceRenderer::Piece DeviceRenderer::render(std::size_t first, std::size_t coun
     return piece;
 }
 
+double DeviceRenderer::work_of(std::span<const std::uint64_t> sums) const {
+    double ns = 0;
+    for (std::size_t row = 0; row < sums.size(); row += FILM_WORDS)
+        for (std::size_t k = 0; k < WORK_KINDS; ++k) ns += work_limit_.weights[k] * static_cast<double>(sums[row + FILM_WORK + k]);
+    return ns;
+}
+
 void DeviceRenderer::check_work(std::size_t rows) {
-    if (!(most_work_ns_ > 0)) return;
+    if (!(work_limit_.ns > 0)) return;
     std::vector<std::uint64_t> sums(rows * FILM_WORDS);
     sums_.download(std::span(sums));
-    if (work_ns_ + work_of(sums) > most_work_ns_) throw TooMuchWork();
+    if (work_ns_ + work_of(sums) > work_limit_.ns) throw TooMuchWork();
 }
 
 void DeviceRenderer::run(const Batch& batch) {
@@ -188,7 +187,7 @@ void DeviceRenderer::run(const Batch& batch) {
 
 void DeviceRenderer::commit(const Batch& batch) {
     assert(film_ != nullptr);
-    if (most_work_ns_ > 0)
+    if (work_limit_.ns > 0)
         for (const Piece& p : pieces_) work_ns_ += work_of(p.sums);
     for (const Piece& p : pieces_) {
         film_->add(std::span(order_).subspan(p.first, p.count), p.splits, batch.end - batch.begin, p.sums);

@@ -27,7 +27,7 @@ struct Tile {
 class DeviceRenderer : public Worker {
 public:
     /// Builds the program (width 0: the device's own; not `optimised`: sooner), uploads the scene, warms up. Throws DeviceError.
-    DeviceRenderer(const DeviceInfo& info, const DeviceScene& scene, const std::vector<device::uint>& pixels, const std::vector<Tile>& tiles,
+    DeviceRenderer(const DeviceInfo& info, const std::shared_ptr<const DeviceScene>& scene, const std::vector<device::uint>& pixels, const std::vector<Tile>& tiles,
                    int vector_width, bool optimised = true);
 
     /// Most bytes that one batch takes on the device and, as much of it as comes back, on the host.
@@ -47,8 +47,8 @@ public:
     /// Paths of the batches that it has added to the film that it was last aimed at.
     std::uint64_t paths() const { return paths_; }
 
-    /// From now on run() throws TooMuchWork once paths have cost more, of a program that counts its work (src/work_weights.h).
-    void limit_work(double ns) { most_work_ns_ = ns; }
+    /// From now on run() throws TooMuchWork once paths have cost more, of a program that counts its work.
+    void limit_work(const WorkLimit& limit) { work_limit_ = limit; }
 
     /// Work-items that fitted into the device's memory when a batch did not; 0 if all did.
     std::size_t short_of_memory() const { return short_of_memory_; }
@@ -67,6 +67,7 @@ private:
     /// Renders samples [begin, end) of the pixels.
     Piece render(std::size_t first, std::size_t count, std::uint32_t begin, std::uint32_t end);
     void launch(std::size_t items);
+    double work_of(std::span<const std::uint64_t> sums) const;
     /// What the batches so far and the rows of this one have cost, against the limit.
     void check_work(std::size_t rows);
     /// Rows of sums that a work-item fills, of so many with so many samples each.
@@ -99,7 +100,7 @@ private:
     std::size_t units_;                      ///< compute units
     std::size_t most_items_ = SIZE_MAX;      ///< work-items that fit its memory, as far as known
     std::size_t short_of_memory_ = 0;
-    double most_work_ns_ = 0;                ///< 0: no limit
+    WorkLimit work_limit_;
     double work_ns_ = 0;                     ///< of the batches committed, if there is a limit
     std::uint64_t paths_ = 0;
 };

@@ -22,8 +22,8 @@
 namespace clume {
 namespace {
 
-template <class T>
-std::string hash_of(const std::vector<T>& v) {
+template <class T, class A>
+std::string hash_of(const std::vector<T, A>& v) {
     return sha256_hex(std::as_bytes(std::span(v)));
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "kernels/layout.h"
+#include "runtime/host_array.h"
 #include "src/ellipsoid.h"
 #include "src/renderer.h"
 #include "src/scene.h"
@@ -18,22 +19,22 @@ namespace clume {
 struct DeviceScene {
     Normalization normalization;
     device::RenderParams params{};
-    std::vector<device::CellEntry> cells;
-    std::vector<device::CellLeaf> leaves;
-    std::vector<device::Reference> references;
+    HostArray<device::CellEntry> cells;
+    HostArray<device::CellLeaf> leaves;
+    HostArray<device::Reference> references;
     std::vector<float> learned;  ///< first bounds of `progressive`, per leaf
-    std::vector<device::Primitive> primitives;
-    std::vector<device::BvhNode> nodes;
-    std::vector<float> groups;
-    std::vector<device::uint> group_medium;
+    HostArray<device::Primitive> primitives;
+    HostArray<device::BvhNode> nodes;
+    HostArray<float> groups;
+    HostArray<device::uint> group_medium;
     std::vector<device::MediumInfo> media;
-    std::vector<device::float4> shading;
+    HostArray<device::float4> shading;
     std::vector<device::LightInfo> lights;
-    std::vector<device::float4> texels;
-    std::vector<device::AliasEntry> alias;
+    HostArray<device::float4> texels;
+    HostArray<device::AliasEntry> alias;
     std::vector<device::GridInfo> grids;
-    std::vector<device::CellEntry> grid_cells;
-    std::vector<float> grid_values;
+    HostArray<device::CellEntry> grid_cells;
+    HostArray<float> grid_values;
 
     std::vector<std::pair<std::string, std::string>> defines;  ///< of the render program, but CLUME_WIDTH
     std::vector<std::pair<std::string, std::string>> explain;  ///< feature → what the program does about it

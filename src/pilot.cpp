@@ -52,7 +52,7 @@ std::size_t best_of(const std::vector<PilotRow>& rows) {
     return best;
 }
 
-/// A row for the pair by so many samples a pixel, given up above `most_ns` of work per path. `pixels` becomes the number rendered.
+/// A row for the pair by the weights of options.work_limit and so many samples a pixel, given up above `most_ns` of work per path. `pixels` becomes the number rendered.
 /// What is given up follows from counted work alone, so it is the same on any device and in batches of any size.
 PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const Until& until, double most_ns, std::uint32_t samples, std::uint32_t& pixels) {
     PilotRow row;
@@ -63,7 +63,7 @@ PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodP
         o.crop.reset();
         o.noise_threshold.reset();
         o.most_pixels = kPixels;
-        if (std::isfinite(most_ns)) o.most_work_ns = most_ns * samples * pixels;
+        o.work_limit.ns = std::isfinite(most_ns) ? most_ns * samples * pixels : 0;
         Renderer renderer(with_pair(scene, pair), o);
         Accumulation film = renderer.start(scene.render.seed, kFirstSample);
         pixels = renderer.rendered_pixels();
@@ -73,7 +73,7 @@ PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodP
             if (pixels == 0 || until.over()) return row;
             const RenderResult r = renderer.result(film);
             row.work_ns = row.variance = 0;
-            for (std::size_t k = 0; k < WORK_KINDS; ++k) row.work_ns += work_weights_ns[k] * static_cast<double>(r.stats.work[k]) / (static_cast<double>(pixels) * done);
+            for (std::size_t k = 0; k < WORK_KINDS; ++k) row.work_ns += o.work_limit.weights[k] * static_cast<double>(r.stats.work[k]) / (static_cast<double>(pixels) * done);
             row.too_slow = row.work_ns > most_ns;
             if (done < samples) continue;
             for (const float v : r.image.variance) row.variance += static_cast<double>(v) * samples / (3.0 * static_cast<double>(pixels));
@@ -172,8 +172,8 @@ std::vector<std::pair<std::string, std::string>> Pilot::table() const {
     std::vector<std::pair<std::string, std::string>> lines;
     for (std::size_t i = 0; i < rows.size(); ++i) {
         const PilotRow& r = rows[i];
-        const std::string what = r.too_slow ? fmt::format("given up: work above {:.0f} ns per path", r.work_ns)
-                                 : r.error.empty() ? fmt::format("variance {:.4g}, work {:.0f} ns per path, inverse efficiency {:.4g}{}", r.variance, r.work_ns, r.inverse_efficiency(), i == chosen ? "  <- chosen" : "")
+        const std::string what = r.too_slow ? fmt::format("given up: work above {:.4g} ns per path", r.work_ns)
+                                 : r.error.empty() ? fmt::format("variance {:.4g}, work {:.4g} ns per path, inverse efficiency {:.4g}{}", r.variance, r.work_ns, r.inverse_efficiency(), i == chosen ? "  <- chosen" : "")
                                                  : "not measured: " + r.error;
         lines.emplace_back("pilot " + r.pair.label(), what);
     }
@@ -188,13 +188,14 @@ std::filesystem::path pilot_folder() {
 std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options, const std::filesystem::path& folder, const std::atomic<bool>& stop) {
     if (scene.render.strategy != "auto") return std::nullopt;
     if (primitive_count(scene) == 0 && scene.grids.empty()) return std::nullopt;
-    // One device is enough, and which one makes no difference.
+    // One device is enough, and which one of a kind makes no difference.
     RenderOptions one = options;
     one.cpu_split = 0;
     one.batch_samples = 0;
     std::string key = fmt::format("pilot {} {} seed {} {} {} {} {}", kVersion, scene_hash(scene, one), scene.render.seed, scene.render.transmittance, scene.render.bound,
                                   scene.render.majorant_grid.value_or(0), one.accelerator);
-    for (const double w : work_weights_ns) key += fmt::format(" {}", w);
+    one.work_limit.weights = work_weights(select_devices(options.devices));
+    for (const double w : one.work_limit.weights) key += fmt::format(" {}", w);
     key = sha256_hex(key);
     if (!folder.empty())
         if (const auto bytes = load_binary(folder, key))

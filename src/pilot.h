@@ -2,7 +2,7 @@
 // What `auto` becomes: a short pilot renders some pixels of the scene itself with each candidate (strategy, estimator, bound),
 // all unbiased, and takes the one of least variance × work. Work is counted operations times fixed weights
 // (src/work_weights.h), not time, and variances come from exact sums: the choice, and so the image, is the same on every run
-// and device.
+// and on every device, but that GPUs by themselves have weights of their own.
 #pragma once
 
 #include <atomic>

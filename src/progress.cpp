@@ -60,7 +60,7 @@ std::string format_progress(const Progress& progress, std::optional<double> time
     // From the most to the least important: what doesn't fit is left out from the right.
     const std::string percent = fmt::format("{:3.0f} %", std::floor(100 * part));
     const std::string fields[] = {fmt::format("  {} left", format_duration(left_s)), progress.what.empty() ? "" : "  " + progress.what,
-                                  fmt::format("  {:.3g} Mpaths/s", progress.mpaths_s),
+                                  progress.mpaths_s < 1000 ? fmt::format("  {:.3g} Mpaths/s", progress.mpaths_s) : fmt::format("  {:.0f} Mpaths/s", progress.mpaths_s),
                                   fmt::format("  {} of {} samples", format_count(done), total > 0 ? format_count(total) : "?")};
     std::string line = percent;
     for (const std::string& field : fields)

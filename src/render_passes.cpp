@@ -64,7 +64,7 @@ void Renderer::Impl::run_pass(Accumulation::State& a, FilmSums& sums, PassWork w
     for (const auto& w : workers) {
         static_cast<DeviceRenderer&>(*w).aim(sums, a.seed);
         static_cast<DeviceRenderer&>(*w).choose(work.order, work.tiles);
-        static_cast<DeviceRenderer&>(*w).limit_work(options.most_work_ns);
+        static_cast<DeviceRenderer&>(*w).limit_work(options.work_limit);
     }
     const auto start = Clock::now();
     const std::clock_t cpu_start = std::clock();

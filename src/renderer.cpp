@@ -77,17 +77,17 @@ RenderImage develop(const Film& size, const glm::dvec3& b, const CropWindow& w, 
     return image;
 }
 
-/// Whether what rendering takes fits: the scene's copies on CPU devices, film and image, batches, compilers.
+/// Whether what rendering takes beside the scene fits: buffers of CPU devices, film and image, batches, compilers.
 void check_budget(const Scene& scene, const DeviceScene& device, const std::vector<DeviceInfo>& devices, const std::vector<Tile>& tiles, std::uint64_t active_pixels, std::uint64_t all_pixels, bool noise_pilot) {
     constexpr std::uint64_t compiler_bytes = 200'000'000;  // of an OpenCL implementation that builds the programs inside this process
-    std::uint64_t copies = 0, batches = 0;
+    std::uint64_t own = 0, batches = 0;
     for (const DeviceInfo& d : devices) {
-        if (d.type == "cpu") copies += device.byte_size() + 4 * active_pixels;
+        if (d.type == "cpu") own += 4 * active_pixels + 8 * device.learned.size();
         batches += DeviceRenderer::batch_bytes(d, tiles);
     }
     const std::uint64_t films = device.strategy == "progressive" || noise_pilot ? 2 : 1;  // one for what the image does not hold
     require_memory(scene.path, {{"compilers", compiler_bytes},
-                                {"the scene on CPU devices", copies},
+                                {"buffers of CPU devices", own},
                                 {"batches", batches},
                                 {"film", active_pixels * (films * FilmSums::bytes_per_pixel() + 4 + 8 * devices.size())},
                                 {"image", all_pixels * image_bytes}});
@@ -115,7 +115,7 @@ struct DeviceSetup {
     void run() {
         checked(info.label(), [&] {
             test = self_test(info, vector_width);
-            if (test.error.empty()) renderer = std::make_shared<DeviceRenderer>(info, *scene, pixels, tiles, vector_width, optimised);
+            if (test.error.empty()) renderer = std::make_shared<DeviceRenderer>(info, scene, pixels, tiles, vector_width, optimised);
         });
     }
 };

@@ -23,6 +23,17 @@ struct CropWindow {
     int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
+/// Operations by kind: WORK_* of layout.h.
+using WorkCounts = std::array<std::uint64_t, WORK_KINDS>;
+inline constexpr std::array<const char*, WORK_KINDS> work_names = {"cells", "nodes", "groups", "primitives", "densities", "voxels", "segments", "roots", "draws", "events"};
+/// Nanoseconds that an operation of each kind costs.
+using WorkWeights = std::array<double, WORK_KINDS>;
+
+struct WorkLimit {
+    double ns = 0;  ///< 0: none
+    WorkWeights weights{};
+};
+
 struct RenderOptions {
     std::vector<std::string> devices;          ///< as on the command line: ids, name parts, cpu, gpu, all; empty: the best one
     int cpu_split = 0;                         ///< > 1: each CPU device becomes that many sub-devices
@@ -36,16 +47,12 @@ struct RenderOptions {
     int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own
     std::uint32_t most_pixels = 0;             ///< > 0: a pilot: at most so many of the pixels that meet something, by a program that is sooner built
     bool count_work = false;                   ///< count operations (stats.work, image.tests): costs a few per cent of speed
-    double most_work_ns = 0;                   ///< > 0: a pilot: extend() throws TooMuchWork (src/device_renderer.h) once its paths cost more
+    WorkLimit work_limit;                      ///< of a pilot: extend() throws TooMuchWork (src/device_renderer.h) once its paths cost more
     bool kept_cells = true;                    ///< cells that took long to build are kept on disk, and read from there (src/cell_cache.h)
     std::string accelerator = "auto";          ///< of what visits chords (decomposition, analytic, march): "cells", "bvh" or "auto"
     double progressive_start = 1;              ///< factor on the first bounds of `progressive`
     int progressive_warm_up = 24;              ///< passes at most by which `progressive` learns before the image begins
 };
-
-/// Operations by kind: WORK_* of layout.h.
-using WorkCounts = std::array<std::uint64_t, WORK_KINDS>;
-inline constexpr std::array<const char*, WORK_KINDS> work_names = {"cells", "nodes", "groups", "primitives", "densities", "voxels", "segments", "roots", "draws", "events"};
 
 /// What was rendered; arrays cover the crop window, row 0 on top.
 struct RenderImage {

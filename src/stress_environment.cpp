@@ -74,7 +74,7 @@ Image256 image_of(std::size_t width, std::size_t height, const Real& sine, const
 }
 
 /// How often each texel is drawn: slot i by the whole numbers x below 2^64 with floor(x n / 2^64) = i.
-std::vector<Real> drawn_shares(const std::vector<device::AliasEntry>& table) {
+std::vector<Real> drawn_shares(std::span<const device::AliasEntry> table) {
     const std::size_t n = table.size();
     const Real words = Real(0x1p64);
     std::vector<Real> share(n, Real(0));
@@ -89,7 +89,7 @@ std::vector<Real> drawn_shares(const std::vector<device::AliasEntry>& table) {
 }
 
 /// The texel that the bits draw.
-std::size_t drawn_texel(const std::vector<device::AliasEntry>& table, const StressBits& bits) {
+std::size_t drawn_texel(std::span<const device::AliasEntry> table, const StressBits& bits) {
     const Real x = Real(bits.v[1]) * Real(0x1p32) + Real(bits.v[3]);
     const auto slot = static_cast<std::size_t>(num(floor(x * table.size() / Real(0x1p64))));
     return bits.v[2] < table[slot].threshold ? slot : table[slot].other;
@@ -150,7 +150,7 @@ struct Errors {
 };
 
 /// Every texel's share.
-void judge_shares(const std::vector<device::AliasEntry>& table, const Image256& exact_image, const Image256& scene_image, Errors& errors) {
+void judge_shares(std::span<const device::AliasEntry> table, const Image256& exact_image, const Image256& scene_image, Errors& errors) {
     const std::vector<Real> drawn = drawn_shares(table);
     for (std::size_t i = 0; i < drawn.size(); ++i) {
         const Real share = exact_image.share[i], size = std::max(share, Real(Real(1) / drawn.size()));

@@ -1,16 +1,28 @@
 // SPDX-License-Identifier: MIT
-// What a counted operation costs: processor nanoseconds, for telling beforehand which strategy will be faster. Ratios matter,
-// not absolute values; they were fitted on PoCL 3.1 with vectors of 16 (`clume bench --filter ^work/`, which prints how far off
-// they are).
+// What a counted operation costs: nanoseconds, for telling beforehand which strategy will be faster. Ratios matter, not absolute
+// values.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <span>
 
+#include "runtime/device.h"
 #include "src/renderer.h"
 
 namespace clume {
 
-/// Per operation of each kind (WORK_* of layout.h, names in work_names).
-inline constexpr std::array<double, WORK_KINDS> work_weights_ns = {18, 192, 10, 27, 6, 10, 96, 47, 44, 116};
+/// Per operation of each kind (WORK_* of layout.h, names in work_names), of a processor. Fitted on PoCL 3.1 with vectors of 16
+/// (`clume bench --filter ^work/`, which prints how far off they are).
+inline constexpr WorkWeights cpu_work_weights = {18, 192, 10, 27, 6, 10, 96, 47, 44, 116};
+
+/// Of a GPU, whose work-items look at a node's boxes and a group's primitives one after the other while their neighbours wait: by eight
+/// renders on an H100 (docs/performance.md), off by up to 1.7 times; those of densities, voxels and roots are the processor's beside cells.
+inline constexpr WorkWeights gpu_work_weights = {0.006, 0.8, 0.8, 0.006, 0.002, 0.0035, 1.0, 0.016, 0.006, 0.6};
+
+/// Of the devices that share a render: a GPU's if all are.
+inline const WorkWeights& work_weights(std::span<const DeviceInfo> devices) {
+    return std::ranges::all_of(devices, [](const DeviceInfo& d) { return d.type == "gpu"; }) ? gpu_work_weights : cpu_work_weights;
+}
 
 }  // namespace clume

@@ -50,7 +50,7 @@ inline DeviceImage render_device(const Scene& scene, const DeviceScene& device, 
     image.pixels = active_pixels(scene, device, {0, 0, scene.film.width, scene.film.height});
     const std::vector<Tile> tiles{{0, static_cast<std::uint32_t>(image.pixels.size())}};
     FilmSums film(image.pixels.size(), define_of(device, "CLUME_CHANNELS") == "1" ? 1 : 3, static_cast<double>(device.params.film_scale));
-    DeviceRenderer renderer(info, device, image.pixels, tiles, width);
+    DeviceRenderer renderer(info, std::make_shared<const DeviceScene>(device), image.pixels, tiles, width);
     renderer.aim(film, scene.render.seed);
     renderer.run({0, 0, spp});
     renderer.commit({0, 0, spp});

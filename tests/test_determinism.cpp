@@ -5,6 +5,7 @@
 
 #include "tests/device_image.h"
 #include "tests/image_test.h"
+#include "tests/flight_reference.h"
 #include "tests/reference/analytic_scenes.h"
 
 using namespace clume;
@@ -134,6 +135,24 @@ TEST_CASE("Launches.PathsGoOnInTheNext") {
         const DeviceImage cut = render_device(s, device, 16);
         INFO(strategy);
         CHECK(cut.same_bits(whole));
+    }
+}
+
+TEST_CASE("Determinism.HowGpusAreUsedDoesNotMatter") {
+    // A processor taken for a GPU: one float a vector, work-groups of 64, a context that queues share, buffers that are copies.
+    DeviceInfo gpu = select_devices({}).front();
+    gpu.type = "gpu";
+    gpu.native_vector_width = 1;
+    const Queue other(gpu);
+    for (const char* strategy : {"delta", "decomposition", "progressive"}) {
+        Scene scene = colourful();
+        scene.render.strategy = strategy;
+        const DeviceScene device = make_device_scene(scene, {});
+        INFO(strategy);
+        CHECK(render_device(scene, device, 16, gpu).same_bits(render_device(scene, device, 16)));
+        const auto rays = probing::random_rays(3000, 5);
+        const auto flights = Probe(gpu, device).flights(rays, 2).values, same = Probe(select_devices({}).front(), device).flights(rays, 2).values;
+        CHECK(probing::first_difference(flights, same) == rays.size());
     }
 }
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "src/pilot.h"
+#include "src/work_weights.h"
 #include "tests/cli_process.h"
 #include "tests/reference/analytic_scenes.h"
 #include "tests/temp_folder.h"
@@ -149,4 +150,32 @@ TEST_CASE("Pilot.IsToldByExplainAndTheImage") {
     test::Process pinned({"render", "puff.json", "--quiet", "--explain", "-D", "render.strategy=decomposition"}, folder.path);
     CHECK(pinned.wait() == 0);
     CHECK(pinned.err.find("pilot") == std::string::npos);
+}
+
+TEST_CASE("Pilot.GpusHaveWeightsOfTheirOwn", "[quick]") {
+    DeviceInfo cpu, gpu;
+    cpu.type = "cpu";
+    gpu.type = "gpu";
+    CHECK(work_weights(std::vector{gpu, gpu}) == gpu_work_weights);
+    CHECK(work_weights(std::vector{cpu}) == cpu_work_weights);
+    CHECK(work_weights(std::vector{gpu, cpu}) == cpu_work_weights);
+    // Operations per path as the pilot counts them and nanoseconds per path, of renders on an H100 (docs/performance.md).
+    struct Measured {
+        const char* what;
+        WorkWeights counts;
+        double ns;
+    };
+    const Measured measured[] = {{"plume, delta/binary", {28.7, 0, 0, 19.4, 0, 0, 0, 0, 19.4, 4.02}, 3.64},
+                                 {"plume, delta/analytic", {20.3, 12.2, 10.5, 12.0, 0, 0, 0, 0, 12.0, 4.02}, 25.6},
+                                 {"cloud, delta/binary", {62.2, 0, 0, 26.4, 0, 0, 0, 0, 26.4, 4.56}, 2.81},
+                                 {"fire, delta", {35.5, 0, 0, 8.28, 0, 0, 0, 0, 8.28, 2.09}, 2.19},
+                                 {"smoke_dense, delta", {33.3, 0, 0, 10.7, 0, 0, 0, 0, 10.7, 4.01}, 2.90},
+                                 {"smoke, regular", {0, 8.23, 11.8, 0, 0, 0, 45.6, 1.79, 1.29, 1.29}, 64}};
+    for (const Measured& m : measured) {
+        double ns = 0;
+        for (std::size_t k = 0; k < WORK_KINDS; ++k) ns += gpu_work_weights[k] * m.counts[k];
+        INFO(m.what << ": " << ns << " ns by the weights");
+        CHECK(ns < 1.7 * m.ns);
+        CHECK(m.ns < 1.7 * ns);
+    }
 }

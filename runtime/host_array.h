@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// Arrays on the host that CPU devices can use where they are: aligned as OpenCL's largest types are, and on huge pages if large,
+// since what kernels look up at random costs a walk through the page tables beside the cache miss otherwise.
+#pragma once
+
+#include <sys/mman.h>
+
+#include <cstddef>
+#include <new>
+#include <vector>
+
+namespace clume {
+
+template <class T>
+struct PageAllocator {
+    using value_type = T;
+    PageAllocator() = default;
+    template <class U>
+    PageAllocator(const PageAllocator<U>&) {}  // NOLINT(google-explicit-constructor): allocators convert
+
+    T* allocate(std::size_t n) {
+        const std::size_t bytes = n * sizeof(T);
+        void* memory = ::operator new(bytes, alignment(n));
+        if (bytes >= huge_page) madvise(memory, bytes, MADV_HUGEPAGE);  // a wish: without it all is as right, and slower
+        return static_cast<T*>(memory);
+    }
+    void deallocate(T* memory, std::size_t n) { ::operator delete(memory, alignment(n)); }
+
+    template <class U>
+    bool operator==(const PageAllocator<U>&) const {
+        return true;
+    }
+
+private:
+    static constexpr std::size_t huge_page = std::size_t{1} << 21;
+    static std::align_val_t alignment(std::size_t n) { return std::align_val_t(n * sizeof(T) < huge_page ? 128 : huge_page); }
+};
+
+template <class T>
+using HostArray = std::vector<T, PageAllocator<T>>;
+
+}  // namespace clume
