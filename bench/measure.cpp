@@ -7,6 +7,8 @@
 #include <exception>
 #include <memory>
 
+#include "runtime/device.h"
+
 namespace clume::bench {
 namespace {
 
@@ -24,13 +26,18 @@ struct Runner {
     std::unique_ptr<Accumulation> film;
     double active = 0;          ///< pixels that cost something
     std::uint32_t spp = 1;      ///< of a round
+    bool on_cpu = true;
     std::vector<double> cpu_us;
 
-    /// Processor microseconds per path of `samples` more.
+    /// Processor microseconds per path of `samples` more; those of the clock if it is not a processor that renders.
     double run(std::uint32_t samples) {
-        const double before = renderer->result(*film).stats.cpu_s;
+        const double before = seconds();
         renderer->extend(*film, film->end() + samples);
-        return 1e6 * (renderer->result(*film).stats.cpu_s - before) / (active * samples);
+        return 1e6 * (seconds() - before) / (active * samples);
+    }
+    double seconds() const {
+        const RenderStats stats = renderer->result(*film).stats;
+        return on_cpu ? stats.cpu_s : stats.render_s;
     }
 };
 
@@ -38,6 +45,7 @@ Runner make_runner(const Scene& scene, const MethodPair& pair, const RenderOptio
     Runner r;
     r.renderer = std::make_unique<Renderer>(with_pair(scene, pair), options);
     r.film = std::make_unique<Accumulation>(r.renderer->start(seed));
+    r.on_cpu = std::ranges::all_of(select_devices(options.devices), [](const DeviceInfo& d) { return d.type == "cpu"; });
     r.active = std::max(1.0, static_cast<double>(scene.film.width) * scene.film.height - static_cast<double>(r.renderer->setup().empty_pixels));
     return r;
 }

@@ -17,7 +17,7 @@ namespace clume::bench {
 struct Measured {
     MethodPair pair;
     std::string missing;           ///< why there is nothing more here; empty if there is
-    double cpu_us = 0;             ///< per path of a pixel that sees a medium, all threads; median over the rounds
+    double cpu_us = 0;             ///< per path of a pixel that sees a medium, all threads (of a GPU: by the clock); median over the rounds
     double variance = 0;           ///< of one sample, mean over pixels and channels
     double device_bytes = 0, build_s = 0;
     std::array<double, WORK_KINDS> work{};  ///< operations per path, if counted

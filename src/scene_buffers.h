@@ -15,7 +15,7 @@ namespace clume {
 
 struct SceneBuffers {
     /// Uploads what the device can't use where it is. Throws DeviceError.
-    SceneBuffers(Queue& queue, std::shared_ptr<const DeviceScene> shared) : SceneBuffers(queue, *shared, shared) {}
+    SceneBuffers(Queue& queue, const std::shared_ptr<const DeviceScene>& shared) : SceneBuffers(queue, *shared, shared) {}
     /// Of a copy.
     SceneBuffers(Queue& queue, const DeviceScene& scene) : SceneBuffers(queue, std::make_shared<const DeviceScene>(scene)) {}
 

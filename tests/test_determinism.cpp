@@ -139,12 +139,13 @@ TEST_CASE("Launches.PathsGoOnInTheNext") {
 }
 
 TEST_CASE("Determinism.HowGpusAreUsedDoesNotMatter") {
-    // A processor taken for a GPU: one float a vector, work-groups of 64, a context that queues share, buffers that are copies.
+    // A processor taken for a GPU: one float a vector, work-groups of 64, a context that queues share, buffers that are copies. Not
+    // `progressive`, in groups of which Intel's runtime crashes (docs/design.md).
     DeviceInfo gpu = select_devices({}).front();
     gpu.type = "gpu";
     gpu.native_vector_width = 1;
     const Queue other(gpu);
-    for (const char* strategy : {"delta", "decomposition", "progressive"}) {
+    for (const char* strategy : {"delta", "decomposition"}) {
         Scene scene = colourful();
         scene.render.strategy = strategy;
         const DeviceScene device = make_device_scene(scene, {});
