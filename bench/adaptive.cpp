@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "bench/measure.h"
 #include "bench/sections.h"
 #include "src/adaptive.h"
 #include "src/device_camera.h"
@@ -57,7 +58,7 @@ struct Squares {
 struct Side {
     std::vector<double> seconds, worst, rms;
     void add(const RenderResult& r, const Errors& e, bool on_cpu) {
-        seconds.push_back(on_cpu ? r.stats.cpu_s : r.stats.render_s);  // which a busy machine disturbs less
+        seconds.push_back(seconds_of(r.stats, on_cpu));
         worst.push_back(e.worst);
         rms.push_back(e.rms);
     }

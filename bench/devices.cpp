@@ -69,12 +69,12 @@ private:
 
 void measure(Session& session, const Shared& shared) {
     const Scene scene = reference::ball_scene();
-    const DeviceScene device = make_device_scene(scene, session.render_options());
+    const auto shared_scene = std::make_shared<const DeviceScene>(make_device_scene(scene, session.render_options()));
+    const DeviceScene& device = *shared_scene;
     const auto pixels = active_pixels(scene, device, {0, 0, scene.film.width, scene.film.height});
     std::vector<Tile> tiles;
     for (std::uint32_t first = 0; first < pixels.size(); first += 1024) tiles.push_back({first, std::min<std::uint32_t>(1024, static_cast<std::uint32_t>(pixels.size()) - first)});
     FilmSums film(pixels.size(), 1, static_cast<double>(device.params.film_scale));
-    const auto shared_scene = std::make_shared<const DeviceScene>(device);
     Workers all;
     for (const DeviceInfo& d : shared.devices) {
         all.push_back(std::make_shared<DeviceRenderer>(d, shared_scene, pixels, tiles, session.options().width));

@@ -50,19 +50,20 @@ Scene ball() {
 
 /// One of the two programs, with what was measured of it: per round.
 struct Side {
-    DeviceScene device;
+    double film_scale = 0;
     std::unique_ptr<DeviceRenderer> renderer;
     std::vector<double> path_s, variance;
 
-    Side(Session& session, const Scene& scene, const std::vector<device::uint>& pixels, const std::vector<Tile>& tiles, bool lamps)
-        : device(make_device_scene(scene, session.render_options())) {
+    Side(Session& session, const Scene& scene, const std::vector<device::uint>& pixels, const std::vector<Tile>& tiles, bool lamps) {
+        DeviceScene device = make_device_scene(scene, session.render_options());
+        film_scale = static_cast<double>(device.params.film_scale);
         for (auto& [name, value] : device.defines)
             if (name == "CLUME_LAMPS" && !lamps) value = "0";
-        renderer = std::make_unique<DeviceRenderer>(session.device(), std::make_shared<const DeviceScene>(device), pixels, tiles, session.options().width);
+        renderer = std::make_unique<DeviceRenderer>(session.device(), std::make_shared<const DeviceScene>(std::move(device)), pixels, tiles, session.options().width);
     }
     /// Seconds that it took.
     double round(const std::vector<device::uint>& pixels, std::uint64_t seed, std::uint32_t spp, bool keep) {
-        FilmSums film(pixels.size(), 1, static_cast<double>(device.params.film_scale));
+        FilmSums film(pixels.size(), 1, film_scale);
         renderer->aim(film, seed);
         const auto start = std::chrono::steady_clock::now();
         renderer->run({0, 0, spp});

@@ -35,10 +35,7 @@ struct Runner {
         renderer->extend(*film, film->end() + samples);
         return 1e6 * (seconds() - before) / (active * samples);
     }
-    double seconds() const {
-        const RenderStats stats = renderer->result(*film).stats;
-        return on_cpu ? stats.cpu_s : stats.render_s;
-    }
+    double seconds() const { return seconds_of(renderer->result(*film).stats, on_cpu); }
 };
 
 Runner make_runner(const Scene& scene, const MethodPair& pair, const RenderOptions& options, std::uint64_t seed) {

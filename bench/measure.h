@@ -14,6 +14,9 @@
 
 namespace clume::bench {
 
+/// Seconds that a render has taken so far: of processor time, which a busy machine disturbs less, if CPUs render; else of the clock.
+inline double seconds_of(const RenderStats& stats, bool on_cpu) { return on_cpu ? stats.cpu_s : stats.render_s; }
+
 struct Measured {
     MethodPair pair;
     std::string missing;           ///< why there is nothing more here; empty if there is

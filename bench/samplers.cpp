@@ -6,6 +6,7 @@
 
 #include <vector>
 
+#include "bench/measure.h"
 #include "bench/scenes.h"
 #include "bench/sections.h"
 
@@ -20,7 +21,7 @@ struct Side {
         Accumulation film = renderer.start(seed);
         renderer.extend(film, spp);
         const RenderResult r = renderer.result(film);
-        seconds.push_back(on_cpu ? r.stats.cpu_s : r.stats.render_s);  // which a busy machine disturbs less
+        seconds.push_back(seconds_of(r.stats, on_cpu));
         sum.resize(r.image.rgb.size());
         squares.resize(r.image.rgb.size());
         for (std::size_t i = 0; i < sum.size(); ++i) {

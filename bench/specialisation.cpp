@@ -92,11 +92,11 @@ void bench_specialisation_section(Session& session) {
     for (const Variant* v : wanted) {
         Run& run = runs.emplace_back();
         run.variant = v;
-        const DeviceScene changed = with_defines(scene, device, v->defines);
+        DeviceScene changed = with_defines(scene, device, v->defines);
         const bool grey = std::find(changed.defines.begin(), changed.defines.end(), std::pair<std::string, std::string>("CLUME_CHANNELS", "1")) != changed.defines.end();
         run.film = std::make_unique<FilmSums>(pixels.size(), grey ? 1 : 3, static_cast<double>(changed.params.film_scale));
         const auto start = std::chrono::steady_clock::now();
-        run.renderer = std::make_unique<DeviceRenderer>(session.device(), std::make_shared<const DeviceScene>(changed), pixels, tiles, session.options().width);
+        run.renderer = std::make_unique<DeviceRenderer>(session.device(), std::make_shared<const DeviceScene>(std::move(changed)), pixels, tiles, session.options().width);
         run.renderer->aim(*run.film, scene.render.seed);
         run.compile_s = seconds_since(start);
     }

@@ -8,6 +8,7 @@
 
 #include "runtime/program.h"
 #include "src/error.h"
+#include "src/work_weights.h"
 
 namespace clume {
 namespace {
@@ -38,7 +39,6 @@ DeviceRenderer::DeviceRenderer(const DeviceInfo& info, const std::shared_ptr<con
       progress_(queue_, 2),
       raised_(scene->learned.size(), 0.0f),
       pool_(vector_width_of(info, vector_width) == 1),
-      zeroed_(pool_ || scene->lanes),
       lanes_(scene->lanes ? static_cast<std::size_t>(vector_width_of(info, vector_width)) : 1),
       wanted_items_(items_wanted(info)),
       units_(std::max(1u, info.compute_units)) {
@@ -122,8 +122,7 @@ DeviceRenderer::Piece DeviceRenderer::render(std::size_t first, std::size_t coun
         states_ = Buffer<device::PathState>(queue_, items * lanes_);
         sums_ = Buffer<std::uint64_t>(queue_, rows * FILM_WORDS);
     }
-    // By the host: Oclgrind does not know buffers that kernels or fills have made.
-    if (zeroed_) sums_.zero();
+    if (pool_ || lanes_ > 1) sums_.zero();  // work-items add to them
     progress_.upload(std::vector<device::uint>(2));
     cl_uint resume = 0;
     for (;;) {
@@ -149,7 +148,7 @@ DeviceRenderer::Piece DeviceRenderer::render(std::size_t first, std::size_t coun
 double DeviceRenderer::work_of(std::span<const std::uint64_t> sums) const {
     double ns = 0;
     for (std::size_t row = 0; row < sums.size(); row += FILM_WORDS)
-        for (std::size_t k = 0; k < WORK_KINDS; ++k) ns += work_limit_.weights[k] * static_cast<double>(sums[row + FILM_WORK + k]);
+        ns += work_ns(work_limit_.weights, sums.subspan(row + FILM_WORK).first<WORK_KINDS>());
     return ns;
 }
 

@@ -94,7 +94,6 @@ private:
     bool aimed_ = false;                     ///< params_ are on the device
     bool chosen_ = true;                     ///< so are the pixels in their order
     bool pool_;                              ///< work-items take their paths from a pool
-    bool zeroed_;                            ///< they add to the rows of sums, which are 0 before
     std::size_t lanes_;                      ///< paths that a work-item has side by side
     std::size_t wanted_items_;               ///< rows that keep the device busy
     std::size_t units_;                      ///< compute units

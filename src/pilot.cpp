@@ -52,8 +52,8 @@ std::size_t best_of(const std::vector<PilotRow>& rows) {
     return best;
 }
 
-/// A row for the pair by the weights of options.work_limit and so many samples a pixel, given up above `most_ns` of work per path. `pixels` becomes the number rendered.
-/// What is given up follows from counted work alone, so it is the same on any device and in batches of any size.
+/// A row for the pair by the weights of options.work_limit and so many samples a pixel, given up above `most_ns` of work per path.
+/// `pixels` becomes the number rendered. What is given up follows from counted work alone, so it is the same on any device and in batches of any size.
 PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodPair& pair, const Until& until, double most_ns, std::uint32_t samples, std::uint32_t& pixels) {
     PilotRow row;
     row.pair = pair;
@@ -72,8 +72,8 @@ PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodP
             renderer.extend(film, kFirstSample + done, {{}, &until.stop, until.left_s()});
             if (pixels == 0 || until.over()) return row;
             const RenderResult r = renderer.result(film);
-            row.work_ns = row.variance = 0;
-            for (std::size_t k = 0; k < WORK_KINDS; ++k) row.work_ns += o.work_limit.weights[k] * static_cast<double>(r.stats.work[k]) / (static_cast<double>(pixels) * done);
+            row.variance = 0;
+            row.work_ns = work_ns(o.work_limit.weights, r.stats.work) / (static_cast<double>(pixels) * done);
             row.too_slow = row.work_ns > most_ns;
             if (done < samples) continue;
             for (const float v : r.image.variance) row.variance += static_cast<double>(v) * samples / (3.0 * static_cast<double>(pixels));

@@ -13,7 +13,6 @@
 namespace clume {
 namespace {
 
-
 /// A queue and a program that probes with equal options share: code is generated once per program.
 struct Compiled {
     Compiled(const DeviceInfo& info, const ProgramOptions& options) : queue(info), program(build_program(queue, "probe.cl", options)) {}

@@ -15,7 +15,26 @@ namespace clume {
 
 struct SceneBuffers {
     /// Uploads what the device can't use where it is. Throws DeviceError.
-    SceneBuffers(Queue& queue, const std::shared_ptr<const DeviceScene>& shared) : SceneBuffers(queue, *shared, shared) {}
+    SceneBuffers(Queue& queue, std::shared_ptr<const DeviceScene> scene)
+        : owner(std::move(scene)),
+          params(queue, std::span(&owner->params, 1)),
+          cells(queue, owner->cells),
+          leaves(queue, owner->leaves),
+          references(queue, owner->references),
+          primitives(queue, owner->primitives),
+          nodes(queue, owner->nodes),
+          groups(queue, owner->groups),
+          group_medium(queue, owner->group_medium),
+          media(queue, owner->media),
+          shading(queue, owner->shading),
+          lights(queue, owner->lights),
+          texels(queue, owner->texels),
+          alias(queue, owner->alias),
+          learned(queue, owner->learned),
+          raised(queue, std::vector<device::uint>(owner->learned.size()), CL_MEM_READ_WRITE),
+          grids(queue, owner->grids),
+          grid_cells(queue, owner->grid_cells),
+          grid_values(queue, owner->grid_values) {}
     /// Of a copy.
     SceneBuffers(Queue& queue, const DeviceScene& scene) : SceneBuffers(queue, std::make_shared<const DeviceScene>(scene)) {}
 
@@ -46,28 +65,6 @@ struct SceneBuffers {
     Buffer<device::GridInfo> grids;
     Buffer<device::CellEntry> grid_cells;
     Buffer<float> grid_values;
-
-private:
-    SceneBuffers(Queue& queue, const DeviceScene& scene, std::shared_ptr<const DeviceScene> shared)
-        : owner(std::move(shared)),
-          params(queue, std::span(&scene.params, 1)),
-          cells(queue, scene.cells),
-          leaves(queue, scene.leaves),
-          references(queue, scene.references),
-          primitives(queue, scene.primitives),
-          nodes(queue, scene.nodes),
-          groups(queue, scene.groups),
-          group_medium(queue, scene.group_medium),
-          media(queue, scene.media),
-          shading(queue, scene.shading),
-          lights(queue, scene.lights),
-          texels(queue, scene.texels),
-          alias(queue, scene.alias),
-          learned(queue, scene.learned),
-          raised(queue, std::vector<device::uint>(scene.learned.size()), CL_MEM_READ_WRITE),
-          grids(queue, scene.grids),
-          grid_cells(queue, scene.grid_cells),
-          grid_values(queue, scene.grid_values) {}
 };
 
 }  // namespace clume

@@ -4,7 +4,8 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <span>
 
 #include "runtime/device.h"
@@ -19,6 +20,12 @@ inline constexpr WorkWeights cpu_work_weights = {18, 192, 10, 27, 6, 10, 96, 47,
 /// Of a GPU, whose work-items look at a node's boxes and a group's primitives one after the other while their neighbours wait: by eight
 /// renders on an H100 (docs/performance.md), off by up to 1.7 times; those of densities, voxels and roots are the processor's beside cells.
 inline constexpr WorkWeights gpu_work_weights = {0.006, 0.8, 0.8, 0.006, 0.002, 0.0035, 1.0, 0.016, 0.006, 0.6};
+
+inline double work_ns(const WorkWeights& weights, std::span<const std::uint64_t, WORK_KINDS> counts) {
+    double ns = 0;
+    for (std::size_t k = 0; k < WORK_KINDS; ++k) ns += weights[k] * static_cast<double>(counts[k]);
+    return ns;
+}
 
 /// Of the devices that share a render: a GPU's if all are.
 inline const WorkWeights& work_weights(std::span<const DeviceInfo> devices) {

@@ -4,8 +4,8 @@
 #include <numbers>
 
 #include "tests/device_image.h"
-#include "tests/image_test.h"
 #include "tests/flight_reference.h"
+#include "tests/image_test.h"
 #include "tests/reference/analytic_scenes.h"
 
 using namespace clume;
