@@ -5,9 +5,9 @@
 
 /// Entry distances of the ray into the node's boxes; CLUME_INFINITY where it misses or enters beyond t_end.
 static float8 bvh_test(__global const BvhNode* node, float3 o, float3 inverse, float t_begin, float t_end) {
-    const float8 ax = (vload8(0, node->lo_x) - o.x) * inverse.x, bx = (vload8(0, node->hi_x) - o.x) * inverse.x;
-    const float8 ay = (vload8(0, node->lo_y) - o.y) * inverse.y, by = (vload8(0, node->hi_y) - o.y) * inverse.y;
-    const float8 az = (vload8(0, node->lo_z) - o.z) * inverse.z, bz = (vload8(0, node->hi_z) - o.z) * inverse.z;
+    const float8 ax = (*(__global const float8*)node->lo_x - o.x) * inverse.x, bx = (*(__global const float8*)node->hi_x - o.x) * inverse.x;
+    const float8 ay = (*(__global const float8*)node->lo_y - o.y) * inverse.y, by = (*(__global const float8*)node->hi_y - o.y) * inverse.y;
+    const float8 az = (*(__global const float8*)node->lo_z - o.z) * inverse.z, bz = (*(__global const float8*)node->hi_z - o.z) * inverse.z;
     float8 near = select(ax, bx, bx < ax), far = select(bx, ax, bx < ax);
     const float8 ny = select(ay, by, by < ay), fy = select(by, ay, by < ay);
     const float8 nz = select(az, bz, bz < az), fz = select(bz, az, bz < az);
@@ -57,25 +57,35 @@ static void bvh_decompose(float3 o, float3 d, float t_begin, uint2 key, float* b
 
 /// Where a walk over the groups of the bvh stands; its stack is the caller's, so that this can stay in registers.
 typedef struct {
-    float8 entry;  // of the ray into the boxes of the node that is open
-    uint node;
-    int child;     // next one of it
-    int height;    // of the stack
+    uint node;    // that is open
+    uint child;   // next one of it
+    uint met;     // bits: which ones the ray meets, from there on
+    int height;   // of the stack
 } BvhWalk;
 
 static void bvh_begin(BvhWalk* w, uint* stack) {
     stack[0] = 0;
     w->height = 1;
-    w->child = BVH_ARITY;
+    w->met = 0;
+}
+
+/// Bits of the node's boxes that the ray meets between t_begin and t_end.
+static uint bvh_met(__global const BvhNode* node, float3 o, float3 inverse, float t_begin, float t_end) {
+    const int8 bits = (bvh_test(node, o, inverse, t_begin, t_end) < (float8)t_end) & (int8)(1, 2, 4, 8, 16, 32, 64, 128);
+    const int4 b4 = bits.lo | bits.hi;
+    const int2 b2 = b4.lo | b4.hi;
+    return (uint)(b2.x | b2.y);
 }
 
 /// The next group that the ray may meet between t_begin and t_end, in no order of distance; BVH_NONE when there is none left.
 static uint bvh_next(BvhWalk* w, uint* stack, float3 o, float3 inverse, float t_begin, float t_end, Work* work, __global const BvhNode* nodes) {
     for (;;) {
-        while (w->child < BVH_ARITY) {
-            const int i = w->child++;
+        while (w->met != 0) {
+            const uint i = w->child++, met = w->met & 1u;
+            w->met >>= 1;
+            if (!met) continue;
             const uint child = nodes[w->node].child[i];
-            if (child == BVH_NONE || !(((const float*)&w->entry)[i] < t_end)) continue;
+            if (child == BVH_NONE) continue;
             if (child & BVH_LEAF) {
                 COUNT(work, WORK_GROUPS, 1);
                 return child & ~BVH_LEAF;
@@ -85,7 +95,7 @@ static uint bvh_next(BvhWalk* w, uint* stack, float3 o, float3 inverse, float t_
         if (w->height == 0) return BVH_NONE;
         COUNT(work, WORK_NODES, 1);
         w->node = stack[--w->height];
-        w->entry = bvh_test(nodes + w->node, o, inverse, t_begin, t_end);
+        w->met = bvh_met(nodes + w->node, o, inverse, t_begin, t_end);
         w->child = 0;
     }
 }

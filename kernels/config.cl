@@ -128,6 +128,9 @@
 #ifndef CLUME_LANES_ROUNDS  // of CLUME_WIDTH 1: collisions before its neighbours' flights that ended are looked after
 #define CLUME_LANES_ROUNDS 4
 #endif
+#ifndef CLUME_LANES_GROUPS  // of CLUME_WIDTH 1: groups of primitives that an analytic shadow ray looks at likewise
+#define CLUME_LANES_GROUPS 1
+#endif
 
 #define CONCAT_(a, b) a##b
 #define CONCAT(a, b) CONCAT_(a, b)

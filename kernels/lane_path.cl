@@ -6,8 +6,11 @@
 
 #if CLUME_LANES
 
-// Shadow rays that are flights, too, are flown side by side with the others: lanes stay full.
-#define LANE_SHADOWS (CLUME_NEE && CLUME_TRANSMITTANCE == TRANSMITTANCE_BINARY)
+// Shadow rays that are flights, too, are flown side by side with the others: lanes stay full. Of CLUME_WIDTH 1, those that add up
+// depths go on step by step beside the neighbours' flights, for the same reason.
+#define LANE_WALKS (CLUME_NEE && CLUME_WIDTH == 1 && CLUME_TRANSMITTANCE == TRANSMITTANCE_ANALYTIC && CLUME_ACCEL == ACCEL_BVH && !CLUME_GRIDS)
+#define LANE_SHADOWS (LANE_WALKS || (CLUME_NEE && CLUME_TRANSMITTANCE == TRANSMITTANCE_BINARY))
+#define LANE_STACK (LANE_WALKS ? CLUME_BVH_STACK : 1)
 
 typedef struct {
     LaneFlights flight;
@@ -23,8 +26,14 @@ typedef struct {
     vint under_way, result;   // of the flights
 #if LANE_SHADOWS
     vint shadow;                     // mask: the flight is a shadow ray's
-    vfloat light[CLUME_CHANNELS];    // what it adds if it gets through
+    vfloat light[CLUME_CHANNELS];    // what it adds if it gets through; before beta, if it adds up depths
     vfloat next_x, next_y, next_z;   // direction that the path takes afterwards
+#endif
+#if LANE_WALKS
+    vint walking;      // mask: the shadow ray adds up depths
+    BvhWalk walk;
+    float3 inverse;
+    ulong depth, limit;
 #endif
     vuint above;              // look-ups above their bound by lanes_fly
     uint violations;          // such look-ups by others
@@ -90,9 +99,17 @@ static void lanes_start(Lanes* l, vint mask, __constant const RenderParams* para
 }
 
 /// Begins the flights of the lanes in `mask`.
-static void lanes_depart(Lanes* l, vint mask, __constant const RenderParams* params, __global const CellEntry* cells, __global const LightInfo* lights) {
+static void lanes_depart(Lanes* l, uint* stack, vint mask, __constant const RenderParams* params, __global const CellEntry* cells, __global const LightInfo* lights) {
     vint path = mask;
-#if LANE_SHADOWS
+#if LANE_WALKS
+    if (l->shadow) {
+        bvh_begin(&l->walk, stack);
+        l->inverse = ray_inverse(lane_direction(&l->flight, 0));
+        l->depth = 0;
+        l->walking = -1;
+        return;
+    }
+#elif LANE_SHADOWS
     path &= vnot(l->shadow);  // a shadow ray knows its end
 #endif
     LANE_SET(l->t_surface, (vfloat)CLUME_INFINITY, path);
@@ -233,7 +250,11 @@ static void lanes_collide(Lanes* l, vint mask, SCENE_ARGS) {
         uint word;
         if (!path_light_sample(lane_origin(f, i), lane_direction(f, i), LANE_OF(uint, phase, i), LANE_OF(float, g, i), &r, &s, &value, &word, SCENE)) continue;
 #if LANE_SHADOWS
+#if LANE_WALKS
+        l->limit = transmittance_limit(exponential_s(word));
+#else
         value *= LANE_SPECTRUM(l->beta, i);
+#endif
         for (int k = 0; k < CLUME_CHANNELS; ++k) ((float*)(l->light + k))[i] = LANE_CHANNEL(value, k);
         ((float*)&f->dx)[i] = s.direction.x;
         ((float*)&f->dy)[i] = s.direction.y;
@@ -265,6 +286,25 @@ static void lanes_collide(Lanes* l, vint mask, SCENE_ARGS) {
     lanes_turn(l, x, y, z, onward);
 }
 
+#if LANE_WALKS
+/// The next groups of a shadow ray that adds up depths, as transmittance_analytic does.
+static void lanes_walk(Lanes* l, uint* stack, SCENE_ARGS) {
+    const float3 o = lane_origin(&l->flight, 0), d = lane_direction(&l->flight, 0);
+    Work work;
+    work_clear(&work);
+    for (int round = 0; round < CLUME_LANES_GROUPS && l->walking; ++round) {
+        const uint group = bvh_next(&l->walk, stack, o, l->inverse, 0.0f, l->t_surface, &work, nodes);
+        if (group != BVH_NONE) l->depth += group_depth(group, o, d, 0.0f, l->t_surface, -CLUME_INFINITY, CLUME_INFINITY, SCENE);
+        const bool dark = l->depth >= l->limit;
+        if (group != BVH_NONE && !dark) continue;
+        const float through = dark ? 0.0f : transmittance_below(l->depth, l->limit);
+        for (int k = 0; k < CLUME_CHANNELS; ++k) l->light[k] = l->beta[k] * (l->light[k] * through);
+        l->walking = 0;
+        l->result = FLIGHT_ESCAPED;
+    }
+}
+#endif
+
 #if LANE_SHADOWS
 /// Shadow rays that have ended: what got through counts, and the paths go on.
 static void lanes_lit(Lanes* l, vint mask) {
@@ -285,19 +325,24 @@ static void lanes_clear(Lanes* l, __constant const RenderParams* params) {
 
 /// A step of all paths: those in *waiting depart (if `tired`, only to end a shadow ray: paths are not saved amid one), those in *out
 /// fly on, and what has ended is looked after. *over: the paths that are complete. False if none is out.
-static bool lanes_advance(Lanes* l, vint* waiting, vint* out, bool tired, vint* over, int* events, SCENE_ARGS) {
+static bool lanes_advance(Lanes* l, uint* stack, vint* waiting, vint* out, bool tired, vint* over, int* events, SCENE_ARGS) {
     vint departing = tired ? (vint)0 : *waiting;
 #if LANE_SHADOWS
     departing |= *waiting & l->shadow;
 #endif
-    if (vany(departing)) lanes_depart(l, departing, params, cells, lights);
+    if (vany(departing)) lanes_depart(l, stack, departing, params, cells, lights);
     *out |= departing;
     *waiting &= vnot(departing);
     if (!vany(*out)) return false;
     const int busy = lanes_count(l->under_way);
     if (busy > 0) lanes_fly(&l->flight, &l->draws, &l->under_way, &l->result, tired ? 0 : busy * CLUME_LANES_ENOUGH / 16, &l->above, SCENE);
-    vint ended = *out & vnot(l->under_way);
-    *out = l->under_way;
+    vint going = l->under_way;
+#if LANE_WALKS
+    if (l->walking) lanes_walk(l, stack, SCENE);
+    going |= l->walking;
+#endif
+    vint ended = *out & vnot(going);
+    *out = going;
     const vuint tentative = vselect(l->flight.draw % (vuint)CLUME_FLIGHT_DRAWS, (vuint)CLUME_FLIGHT_DRAWS, l->result == (vint)FLIGHT_PAUSED);
     *events += (int)lanes_total(vselect((vuint)0u, 1u + TENTATIVE_EVENTS(tentative), ended));
 #if LANE_SHADOWS

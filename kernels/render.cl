@@ -134,6 +134,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     states += (size_t)get_global_id(0) * CLUME_WIDTH;
     sums += (size_t)share.first_row * FILM_WORDS;
     Lanes l;
+    uint stack[LANE_STACK];
     lanes_clear(&l, params);
     Rows rows;
     rows.index = rows.pixel = (vuint)0u;
@@ -165,7 +166,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
             }
         }
         vint over;
-        if (!lanes_advance(&l, &waiting, &out, tired, &over, &events, SCENE)) break;
+        if (!lanes_advance(&l, stack, &waiting, &out, tired, &over, &events, SCENE)) break;
         if (!vany(over)) continue;
         for (int i = 0; i < CLUME_WIDTH; ++i) {
             if (!LANE_OF(int, over, i)) continue;

@@ -29,6 +29,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
     bool left = true;  // in the pool, as far as known
 #if CLUME_LANES
     Lanes l;
+    uint stack[LANE_STACK];
     lanes_clear(&l, params);
     if (resume) {
         lanes_resume(&l, 0, state);
@@ -49,7 +50,7 @@ __kernel void render(SCENE_ARGS, __global const uint* pixels, __global PathState
             }
         }
         vint over;
-        if (!lanes_advance(&l, &waiting, &out, tired, &over, &events, SCENE)) break;
+        if (!lanes_advance(&l, stack, &waiting, &out, tired, &over, &events, SCENE)) break;
         if (!over) continue;
         __global ulong* sum = sums + (size_t)l.row * FILM_WORDS;
         film_sample(sum, LANE_SPECTRUM(l.radiance, 0), params->film_scale);

@@ -20,6 +20,12 @@ static ulong transmittance_limit(float e) {
     return ((ulong)CLUME_EXACT_DEPTH << 40) + convert_ulong_rtz(min_s(e, 128.0f - CLUME_EXACT_DEPTH) * 0x1p40f);
 }
 
+/// What a sum that has ended below the limit says.
+static float transmittance_below(ulong depth, ulong limit) {
+    const ulong exact = (ulong)CLUME_EXACT_DEPTH << 40;
+    return depth_transmittance(limit < ((ulong)128 << 40) && depth > exact ? exact : depth);
+}
+
 /// Estimate of the transmittance from o along d up to t_end; `limit` from transmittance_limit. Without roulette, error < 1e-6 absolute
 /// against lines within the intersection's limit.
 static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit, Work* work, SCENE_ARGS) {
@@ -46,8 +52,7 @@ static float transmittance_analytic(float3 o, float3 d, float t_end, ulong limit
     depth = grids_depth(depth, o, d, t_end, limit, work, SCENE);
     if (depth >= limit) return 0.0f;
 #endif
-    const ulong exact = (ulong)CLUME_EXACT_DEPTH << 40;
-    return depth_transmittance(limit < ((ulong)128 << 40) && depth > exact ? exact : depth);
+    return transmittance_below(depth, limit);
 }
 
 /// exp(−Σ σ(middle) step) by steps from the origin, as `march` flights have them.
