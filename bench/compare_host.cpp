@@ -87,10 +87,10 @@ void compare_paths(Session& session, const std::string& name, Scene scene, int t
     if (!options.strategy.empty()) scene.render.strategy = options.strategy;
     const int cells = best_cells(scene, [&](const reference::HostTracer& t, std::uint64_t seed) { t.trace(1, seed, threads); });
     const reference::HostTracer host(scene, cells);
-    const RenderOptions render_options = session.render_options();
+    RenderOptions render_options = session.render_options();
     const std::atomic<bool> stop{false};
     // The method is the one that `clume render` takes.
-    if (const auto pilot = run_pilot(scene, render_options, pilot_folder(), stop)) scene = with_pair(std::move(scene), pilot->rows[pilot->chosen].pair);
+    if (const auto pilot = run_pilot(scene, render_options, pilot_folder(), stop)) render_options.pair = pilot->pair();
     const double target = round_seconds(session), pixels = static_cast<double>(scene.film.width) * scene.film.height;
     std::uint32_t host_spp = 2, spp = 8;
     Side theirs, ours;

@@ -38,9 +38,10 @@ struct Runner {
     double seconds() const { return seconds_of(renderer->result(*film).stats, on_cpu); }
 };
 
-Runner make_runner(const Scene& scene, const MethodPair& pair, const RenderOptions& options, std::uint64_t seed) {
+Runner make_runner(const Scene& scene, const MethodPair& pair, RenderOptions options, std::uint64_t seed) {
     Runner r;
-    r.renderer = std::make_unique<Renderer>(with_pair(scene, pair), options);
+    options.pair = pair;
+    r.renderer = std::make_unique<Renderer>(scene, options);
     r.film = std::make_unique<Accumulation>(r.renderer->start(seed));
     r.on_cpu = std::ranges::all_of(select_devices(options.devices), [](const DeviceInfo& d) { return d.type == "cpu"; });
     r.active = std::max(1.0, static_cast<double>(scene.film.width) * scene.film.height - static_cast<double>(r.renderer->setup().empty_pixels));

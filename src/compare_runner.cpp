@@ -37,7 +37,9 @@ bool ComparePlan::extend(Renderer& renderer, Accumulation& film, std::uint32_t e
 }
 
 ReadyPair make_ready(const Scene& scene, const MethodPair& pair, const RenderOptions& options) {
-    return {pair, std::make_unique<Renderer>(with_pair(scene, pair), options)};
+    RenderOptions own = options;
+    own.pair = pair;
+    return {pair, std::make_unique<Renderer>(scene, own)};
 }
 
 void run_pilot(ReadyPair& ready, const Scene& scene, const CompareOptions& options, std::uint32_t spp, ComparePlan& plan, PairRun* run) {

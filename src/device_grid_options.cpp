@@ -20,7 +20,7 @@ void define_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out
 
 void explain_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out) {
     if (scene.grids.empty()) return;
-    const char* bound = scene.render.bound == "scene" ? "null collisions under one bound each" : traits.tables ? "null collisions under a table of bounds" : "null collisions under the bricks' bounds";
+    const char* bound = out.bound == "scene" ? "null collisions under one bound each" : traits.tables ? "null collisions under a table of bounds" : "null collisions under the bricks' bounds";
     const bool nulls = out.strategy == "delta" || out.strategy == "progressive";
     out.explain.emplace_back("voxel media", fmt::format("{}: {} bricks of 8x8x8, {} octree levels, flights by {}", scene.grids.size(), traits.bricks, traits.levels,
                                                         nulls ? bound : out.strategy == "march" ? "marching" : "exact walks from voxel to voxel"));

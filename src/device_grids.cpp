@@ -330,7 +330,7 @@ std::array<glm::dvec3, 8> grid_corners(const VoxelGrid& grid, Interpolation inte
     return corners_of(grid, support_of(grid, interpolation));
 }
 
-GridTraits pack_grids(const Scene& scene, DeviceScene& out) {
+GridTraits pack_grids(const Scene& scene, const std::string& bound, DeviceScene& out) {
     GridTraits traits;
     const RenderSettings& r = scene.render;
     const bool ratio = out.transmittance == "ratio" || out.transmittance == "residual-ratio";
@@ -349,9 +349,9 @@ GridTraits pack_grids(const Scene& scene, DeviceScene& out) {
     }
     // Edges of the tables' cells, in bricks. Lower bounds (of residual-ratio) are the bricks' alone.
     std::vector<int> edges(layouts.size(), 0);
-    if (traits.nulls && r.bound != "scene" && r.bound != "tree" && out.transmittance != "residual-ratio" && out.strategy != "progressive") {
+    if (traits.nulls && bound != "scene" && bound != "tree" && out.transmittance != "residual-ratio" && out.strategy != "progressive") {
         for (std::size_t i = 0; i < scene.grids.size(); ++i) edges[i] = cheapest_edge(layouts[i], out.normalization.scale);
-        traits.tables = r.bound == "grid" || r.majorant_grid || std::any_of(edges.begin(), edges.end(), [](int e) { return e > 1; });
+        traits.tables = bound == "grid" || r.majorant_grid || std::any_of(edges.begin(), edges.end(), [](int e) { return e > 1; });
     }
     for (std::size_t i = 0; i < layouts.size(); ++i) {
         const glm::dvec3 size = layouts[i].support.hi - layouts[i].support.lo;

@@ -24,10 +24,10 @@ struct GridTraits {
 };
 
 /// Appends every grid medium of the scene to out.grids, grid_cells, grid_values, and its corners to out.grid_boxes.
-/// Null collisions get bounds as scene.render says: `scene` one for a grid, `tree` the bricks', `grid` a table of its own with
+/// Null collisions get bounds as `bound` says (one of render.bound): `scene` one for a grid, `tree` the bricks', `grid` a table of its own with
 /// majorant_grid cells along the longest side, or as many as cost least; by default whichever of the latter two costs less.
 /// out.strategy and out.transmittance must be set. Throws SceneError for a grid that can't be held.
-GridTraits pack_grids(const Scene& scene, DeviceScene& out);
+GridTraits pack_grids(const Scene& scene, const std::string& bound, DeviceScene& out);
 
 /// Adds the program's defines and the lines of `--explain`; none for a scene without grids.
 void define_grids(const Scene& scene, const GridTraits& traits, DeviceScene& out);

@@ -247,9 +247,10 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     const LightMasks lights = add_lights(scene, out, with_structures);
     const RenderSettings& r = scene.render;
 
-    out.strategy = r.strategy != "auto" ? r.strategy : "delta";
-    out.transmittance = r.transmittance != "auto" ? r.transmittance : "analytic";
-    out.bound = r.bound != "auto" ? r.bound : out.strategy == "progressive" || r.majorant_grid ? "grid" : "tree";
+    const MethodPair asked = options.pair.value_or(MethodPair{r.strategy, r.transmittance, r.bound});
+    out.strategy = asked.strategy != "auto" ? asked.strategy : "delta";
+    out.transmittance = asked.estimator != "auto" ? asked.estimator : "analytic";
+    out.bound = asked.bound != "auto" ? asked.bound : out.strategy == "progressive" || r.majorant_grid ? "grid" : "tree";
     const auto start = std::chrono::steady_clock::now();
     std::uint64_t primitives = 0;
     for (const auto& m : scene.media) primitives += m.primitives.size();
@@ -262,7 +263,7 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     std::string accelerator;
     if (with_structures) accelerator = build_structures(wanted, tree, r.majorant_grid, options.kept_cells, out);
     else pack_primitives(out);
-    const GridTraits voxels = pack_grids(scene, out);
+    const GridTraits voxels = pack_grids(scene, asked.bound, out);
     Box bounds = bounds_of(out.ellipsoids);
     if (lamps > 0)  // the mixture alone needs no more than its own
         for (const auto& box : out.grid_boxes)
@@ -337,8 +338,8 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
 
     const auto say = [&](const char* feature, std::string what) { out.explain.emplace_back(feature, std::move(what)); };
     const std::initializer_list<const char*> kinds = {"constant", "envmap", "point", "spot", "directional", "sphere", "rectangle"};
-    say("strategy", out.strategy + (r.strategy == "auto" ? " (auto)" : ""));
-    say("transmittance", lights.nee ? out.transmittance + (r.transmittance == "auto" ? " (auto)" : "") : "left out: no light needs it");
+    say("strategy", out.strategy + (asked.strategy == "auto" ? " (auto)" : ""));
+    say("transmittance", lights.nee ? out.transmittance + (asked.estimator == "auto" ? " (auto)" : "") : "left out: no light needs it");
     if (wanted.references || wanted.scene_bound || out.strategy == "progressive") say("bound of null collisions", out.bound);
     say("accelerator", accelerator);
     say("kernel families", names(traits.families, {"gaussian", "epanechnikov", "uniform"}));

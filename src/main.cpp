@@ -139,23 +139,22 @@ int render_scene(const RenderCommand& command) {
     const bool json_on_stdout = command.stats_json && *command.stats_json == "-";
     if (command.stats_json && !json_on_stdout) check_writable(*command.stats_json);
 
-    Scene scene = read_scene(command.scene, command.overrides);
+    const Scene scene = read_scene(command.scene, command.overrides);
     if (const auto& crop = command.options.crop; crop && (crop->x1 > scene.film.width || crop->y1 > scene.film.height))
         throw UsageError(fmt::format("--crop {},{},{},{}: reaches beyond the film, which is {} x {}", crop->x0, crop->y0,
                                      crop->x1, crop->y1, scene.film.width, scene.film.height));
     if (stop_requested()) return interrupted_early();
     const std::vector<DeviceInfo> known = list_devices();
-    const auto pilot_start = std::chrono::steady_clock::now();
     const std::optional<Pilot> pilot = run_pilot(scene, command.options, pilot_folder(), stop_requested());
-    const double pilot_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - pilot_start).count();
     if (stop_requested()) return interrupted_early();
-    if (pilot) scene = with_pair(std::move(scene), pilot->rows[pilot->chosen].pair);
-    else if (scene.render.strategy == "auto" && pilot_s >= command.options.time_limit_s.value_or(pilot_s + 1)) say("measuring strategies took as long as the time limit: going on with delta");
-    if (command.explain) print_explanation(scene, command.options, pilot);
+    RenderOptions options = command.options;
+    if (pilot) options.pair = pilot->pair();
+    if (pilot && pilot->cut_short) say(pilot->summary());
+    if (command.explain) print_explanation(scene, options, pilot);
 
     ProgressReporter progress(command.quiet, command.options.time_limit_s);
     RenderResult result = render(
-        scene, command.options, [&](const Progress& p) { progress.update(p); }, stop_requested());
+        scene, options, [&](const Progress& p) { progress.update(p); }, stop_requested());
     progress.finish();
     RenderStats& stats = result.stats;
     if (pilot) {

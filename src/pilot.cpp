@@ -24,7 +24,7 @@ constexpr std::uint32_t kPixels = 1024;     ///< at most
 constexpr std::uint32_t kSamples = 16;      ///< of each
 constexpr std::uint32_t kFirstSample = 0xc0000000u;  ///< numbers of their own: the image's noise is not what was chosen by
 constexpr std::size_t kFewPrimitives = 64;  ///< up to which one bound for the whole scene may be the cheapest
-constexpr int kVersion = 7;                 ///< of the candidates and of how they are measured
+constexpr int kVersion = 8;                 ///< of the candidates and of how they are measured
 
 std::size_t primitive_count(const Scene& scene) {
     std::size_t count = 0;
@@ -64,7 +64,8 @@ PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodP
         o.noise_threshold.reset();
         o.most_pixels = kPixels;
         o.work_limit.ns = std::isfinite(most_ns) ? most_ns * samples * pixels : 0;
-        Renderer renderer(with_pair(scene, pair), o);
+        o.pair = pair;
+        Renderer renderer(scene, o);
         Accumulation film = renderer.start(scene.render.seed, kFirstSample);
         pixels = renderer.rendered_pixels();
         // Step by step: most of what is too slow shows by its first samples.
@@ -88,11 +89,11 @@ PilotRow measure(const Scene& scene, const RenderOptions& options, const MethodP
     return row;
 }
 
-/// No rows if there is nothing to measure.
-Pilot measure_all(const Scene& scene, const RenderOptions& options, const Until& until) {
+/// No rows if there is nothing to measure, or if it is asked to stop. `likely`: the estimator that is measured first.
+Pilot measure_all(const Scene& scene, const RenderOptions& options, const std::string& likely, const Until& until) {
     Pilot pilot;
     pilot.spp = kSamples;
-    const std::string estimator = scene.render.transmittance == "auto" ? "analytic" : scene.render.transmittance;
+    const std::string estimator = scene.render.transmittance == "auto" ? likely : scene.render.transmittance;
     std::vector<MethodPair> candidates;
     const std::size_t primitives = primitive_count(scene);
     for (const Method& s : strategies()) {
@@ -110,16 +111,28 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const Until&
     // of a strategy without tells when to give them up.
     const auto bounded = std::stable_partition(candidates.begin(), candidates.end(), [](const MethodPair& pair) { return find_strategy(pair.strategy)->null_collisions; });
     double most_ns = std::numeric_limits<double>::infinity();
+    // What is left of a pilot that took too long.
+    const auto cut_short = [&]() -> Pilot {
+        if (until.stop) return {};
+        pilot.cut_short = true;
+        pilot.chosen = best_of(pilot.rows);
+        if (pilot.chosen < pilot.rows.size()) return pilot;
+        pilot.chosen = 0;
+        pilot.rows.assign(1, {{"delta", estimator, scene.render.bound}, 0, 0, false, "no time was left"});
+        return pilot;
+    };
     if (bounded != candidates.begin() && bounded != candidates.end()) {
         const PilotRow rough = measure(scene, options, *bounded, until, most_ns, 1, pilot.pixels);
         if (rough.measured()) most_ns = pilot_patience * rough.work_ns;
-        if (until.over() || (rough.error.empty() && pilot.pixels == 0)) return {};
+        if (until.over()) return cut_short();
+        if (rough.error.empty() && pilot.pixels == 0) return {};
     }
     // Distances drawn by unbiased strategies have one distribution: what tells them apart is work, whatever the estimator.
     for (const MethodPair& pair : candidates) {
-        pilot.rows.push_back(measure(scene, options, pair, until, most_ns, kSamples, pilot.pixels));
-        const PilotRow& row = pilot.rows.back();
-        if (until.over() || (row.error.empty() && pilot.pixels == 0)) return {};
+        const PilotRow row = measure(scene, options, pair, until, most_ns, kSamples, pilot.pixels);
+        if (until.over()) return cut_short();
+        if (row.error.empty() && pilot.pixels == 0) return {};
+        pilot.rows.push_back(row);
         if (row.measured()) most_ns = std::min(most_ns, strategy_patience * row.work_ns);
     }
     double variance = 0, measured = 0;
@@ -133,8 +146,9 @@ Pilot measure_all(const Scene& scene, const RenderOptions& options, const Until&
     const MethodPair winner = pilot.rows[pilot.chosen].pair;
     for (const Method& e : estimators()) {
         if (e.kind != BiasKind::unbiased || e.name == estimator) continue;
-        pilot.rows.push_back(measure(scene, options, {winner.strategy, e.name, winner.bound}, until, pilot_patience * pilot.rows[pilot.chosen].work_ns, kSamples, pilot.pixels));
-        if (until.over()) return {};
+        const PilotRow row = measure(scene, options, {winner.strategy, e.name, winner.bound}, until, pilot_patience * pilot.rows[pilot.chosen].work_ns, kSamples, pilot.pixels);
+        if (until.over()) return cut_short();
+        pilot.rows.push_back(row);
     }
     const std::size_t best = best_of(pilot.rows);
     if (pilot_margin * pilot.rows[best].inverse_efficiency() < pilot.rows[pilot.chosen].inverse_efficiency()) pilot.chosen = best;
@@ -165,7 +179,8 @@ std::optional<Pilot> from_text(const std::string& text) {
 }  // namespace
 
 std::string Pilot::summary() const {
-    return fmt::format("auto chose {} by a pilot of {} x {} paths", rows[chosen].pair.label(), pixels, spp);
+    if (cut_short) return fmt::format("measuring strategies took as long as the time limit: going on with {}", pair().label());
+    return fmt::format("auto chose {} by a pilot of {} x {} paths", pair().label(), pixels, spp);
 }
 
 std::vector<std::pair<std::string, std::string>> Pilot::table() const {
@@ -194,15 +209,16 @@ std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options,
     one.batch_samples = 0;
     std::string key = fmt::format("pilot {} {} seed {} {} {} {} {}", kVersion, scene_hash(scene, one), scene.render.seed, scene.render.transmittance, scene.render.bound,
                                   scene.render.majorant_grid.value_or(0), one.accelerator);
-    one.work_limit.weights = work_weights(select_devices(options.devices));
+    const std::vector<DeviceInfo> devices = select_devices(options.devices);
+    one.work_limit.weights = work_weights(devices);
     for (const double w : one.work_limit.weights) key += fmt::format(" {}", w);
     key = sha256_hex(key);
     if (!folder.empty())
         if (const auto bytes = load_binary(folder, key))
             if (auto pilot = from_text(std::string(bytes->begin(), bytes->end()))) return pilot;
-    Pilot pilot = measure_all(scene, one, {stop, options.time_limit_s});
+    Pilot pilot = measure_all(scene, one, all_gpus(devices) ? "binary" : "analytic", {stop, options.time_limit_s});
     if (pilot.rows.empty()) return std::nullopt;
-    const bool complete = std::all_of(pilot.rows.begin(), pilot.rows.end(), [](const PilotRow& r) { return r.error.empty(); });
+    const bool complete = !pilot.cut_short && std::all_of(pilot.rows.begin(), pilot.rows.end(), [](const PilotRow& r) { return r.error.empty(); });
     if (!folder.empty() && complete) {
         const std::string text = to_text(pilot);
         store_binary(folder, key, {reinterpret_cast<const unsigned char*>(text.data()), text.size()});

@@ -38,6 +38,9 @@ struct Pilot {
     std::vector<PilotRow> rows;  ///< in the order measured
     std::size_t chosen = 0;
     std::uint32_t pixels = 0, spp = 0;
+    bool cut_short = false;  ///< it took as long as the whole render may: chosen is the best so far, or delta
+
+    const MethodPair& pair() const { return rows[chosen].pair; }
 
     /// "auto chose delta:tree/ratio: …", one line.
     std::string summary() const;
@@ -46,8 +49,8 @@ struct Pilot {
 };
 
 /// The pilot for a scene whose strategy is `auto`; nothing if it is pinned, or if there is nothing to choose (no media, no
-/// pixel that meets them), or if `stop` became true or it took as long as the options' time limit. A result is kept in `folder`
-/// (unless that is empty), keyed by all that it depends on. Throws what Renderer throws.
+/// pixel that meets them), or if `stop` became true. A result is kept in `folder` (unless that is empty, or it was cut short),
+/// keyed by all that it depends on. Throws what Renderer throws.
 std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options, const std::filesystem::path& folder, const std::atomic<bool>& stop);
 
 /// Beside the programs' cache; empty if there is none.

@@ -15,6 +15,7 @@
 
 #include "kernels/layout.h"
 #include "src/scene.h"
+#include "src/strategies.h"
 
 namespace clume {
 
@@ -44,6 +45,7 @@ struct RenderOptions {
     std::optional<double> time_limit_s;        ///< stop handing out batches after this long; the image holds what was done
     std::optional<double> noise_threshold;     ///< > 0: a tile of the film gets the samples it needs for that relative error (src/adaptive.h), no more
     std::uint32_t batch_samples = 0;           ///< samples of a pixel per batch; 0: sized to 100–200 ms by measurement
+    std::optional<MethodPair> pair;            ///< instead of the scene's own strategy, transmittance and bound
     int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own
     std::uint32_t most_pixels = 0;             ///< > 0: a pilot: at most so many of the pixels that meet something, by a program that is sooner built
     bool count_work = false;                   ///< count operations (stats.work, image.tests): costs a few per cent of speed

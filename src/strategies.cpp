@@ -87,11 +87,4 @@ std::vector<MethodPair> all_pairs(const Scene& scene, bool estimator_matters) {
     return pairs;
 }
 
-Scene with_pair(Scene scene, const MethodPair& pair) {
-    scene.render.strategy = pair.strategy;
-    scene.render.transmittance = pair.estimator;
-    scene.render.bound = pair.bound;
-    return scene;
-}
-
 }  // namespace clume

@@ -58,7 +58,4 @@ std::vector<MethodPair> pairs_of(const std::string& strategy, const std::string&
 /// The same for every strategy that is one of its own in the scene.
 std::vector<MethodPair> all_pairs(const Scene& scene, bool estimator_matters);
 
-/// The scene with the pair's names in its render settings.
-Scene with_pair(Scene scene, const MethodPair& pair);
-
 }  // namespace clume

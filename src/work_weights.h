@@ -27,9 +27,11 @@ inline double work_ns(const WorkWeights& weights, std::span<const std::uint64_t,
     return ns;
 }
 
-/// Of the devices that share a render: a GPU's if all are.
-inline const WorkWeights& work_weights(std::span<const DeviceInfo> devices) {
-    return std::ranges::all_of(devices, [](const DeviceInfo& d) { return d.type == "gpu"; }) ? gpu_work_weights : cpu_work_weights;
+inline bool all_gpus(std::span<const DeviceInfo> devices) {
+    return std::ranges::all_of(devices, [](const DeviceInfo& d) { return d.type == "gpu"; });
 }
+
+/// Of the devices that share a render: a GPU's if all are.
+inline const WorkWeights& work_weights(std::span<const DeviceInfo> devices) { return all_gpus(devices) ? gpu_work_weights : cpu_work_weights; }
 
 }  // namespace clume

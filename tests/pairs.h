@@ -26,6 +26,14 @@ inline RenderResult render_pair(const Pair& pair, Scene scene, std::uint32_t spp
     return render_by({pair.strategy, pair.accelerator}, scene, spp, seed, options);
 }
 
+/// The scene with the pair's names in its own settings.
+inline Scene with_pair(Scene scene, const MethodPair& pair) {
+    scene.render.strategy = pair.strategy;
+    scene.render.transmittance = pair.estimator;
+    scene.render.bound = pair.bound;
+    return scene;
+}
+
 inline Light sunlight() { return cases::light(LightKind::directional); }
 inline Light small_environment() { return cases::light(LightKind::envmap); }
 
