@@ -27,7 +27,8 @@ struct Data {
 };
 
 /// Ellipsoids of half the unit ball's size about the rays, so that about half of the lanes are hit.
-Data make_data(KernelFamily family) {
+/// `copies` times kRays rays through ellipsoids of the family.
+Data make_data(KernelFamily family, std::size_t copies) {
     Scene scene = reference::random_mixture(family, static_cast<int>(kGroups * CLUME_GROUP_SIZE), 3, 60, 2);
     scene.render.strategy = "decomposition";
     RenderOptions options;
@@ -64,6 +65,8 @@ Data make_data(KernelFamily family) {
         g.tau = -std::log(1 - u(engine));
         data.rays.push_back(g);
     }
+    data.rays.reserve(copies * kRays);
+    for (std::size_t i = kRays; i < copies * kRays; ++i) data.rays.push_back(data.rays[i - kRays]);
     return data;
 }
 
@@ -90,7 +93,7 @@ void add_group_benchmarks(Session& session) {
                 const std::string name = work.by_family ? std::string(work.item) + family.name : work.item;
                 add_kernel_benchmark(session, with_width(name, width), [=, &session](std::uint32_t) {
                     auto d = data.find(family.bit);
-                    if (d == data.end()) d = data.emplace(family.bit, make_data(family.kernel)).first;
+                    if (d == data.end()) d = data.emplace(family.bit, make_data(family.kernel, copies_to_fill(session))).first;
                     auto p = probes.find(width);
                     if (p == probes.end()) p = probes.try_emplace(width, session.device(), width).first;
                     const auto& groups = work.what == GroupWork::intersect_quadratic ? d->second.quadratic : d->second.groups;
@@ -98,7 +101,7 @@ void add_group_benchmarks(Session& session) {
                     const bool chord = work.what != GroupWork::density;
                     const Operations own = work.by_family ? operations(name) : Operations{};
                     const Operations intersection = chord ? operations(work.what == GroupWork::intersect_quadratic ? "intersect_quadratic" : "intersect_whitened") : Operations{};
-                    return Launch{static_cast<double>(kRays * kGroups * CLUME_GROUP_SIZE), run.device_s, {own + intersection, work.bytes, 0, static_cast<double>(groups.size() * sizeof(float))}};
+                    return Launch{static_cast<double>(d->second.rays.size() * kGroups * CLUME_GROUP_SIZE), run.device_s, {own + intersection, work.bytes, 0, static_cast<double>(groups.size() * sizeof(float))}};
                 });
             }
         }
@@ -107,7 +110,7 @@ void add_group_benchmarks(Session& session) {
             add_kernel_benchmark(session, with_width(name, width), [=, &session, what = what, block = block](std::uint32_t) {
                 // Half of the lines meet an ellipsoid: at least so many of the analytic tests follow.
                 static auto& lines = *new std::map<int, ProxyLines>;  // never destroyed: the implementation may be gone by then
-                ProxyLines& l = lines.try_emplace(width, session.device(), width, 60).first->second;
+                ProxyLines& l = lines.try_emplace(width, session.device(), width, 60, copies_to_fill(session)).first->second;
                 const double s = l.launch(what);
                 return Launch{l.tests(), s, {operations(block) + operations("intersect_whitened") * 0.5, what == ProxyWork::mesh ? 36.0 * 4 : 40, 0, l.byte_size(what)}};
             });

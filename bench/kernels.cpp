@@ -127,6 +127,8 @@ double SizedLaunch::undisturbed() const {
     return busiest > 0 ? std::min(seconds, busiest) : seconds;
 }
 
+std::size_t copies_to_fill(Session& session) { return session.device().type == "gpu" ? 64 : 1; }
+
 std::vector<int> kernel_widths(const Session& session) {
     if (session.options().width > 0) return {session.options().width};
     return {cases::vector_widths.begin(), cases::vector_widths.end()};

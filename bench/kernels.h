@@ -28,6 +28,8 @@ void add_accelerator_benchmarks(Session& session);  ///< accelerator_kernels.cpp
 void add_block_benchmarks(Session& session);  ///< block_kernels.cpp: what a path is made of beside those
 void add_sort_benchmarks(Session& session);   ///< sort_kernels.cpp: orders of events, segments
 
+/// Work-items of a launch for each that fills a CPU's cores: a GPU has room for far more.
+std::size_t copies_to_fill(Session& session);
 /// Widths asked for, or all.
 std::vector<int> kernel_widths(const Session& session);
 /// "exp/w16"

@@ -68,7 +68,8 @@ double fma_rate(Session& session, int width, bool with_additions) {
 }
 
 void read_rates(Session& session, PeakLevel& level) {
-    const int width = static_cast<int>(session.device().native_vector_width);
+    // Where vectors are of one, loads are widest of four.
+    const int width = std::max(4, static_cast<int>(session.device().native_vector_width));
     Program p(session, width);
     Buffer<float> data(p.queue, level.byte_size / sizeof(float));
     data.fill(1.0f);

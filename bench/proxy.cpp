@@ -19,7 +19,7 @@
 namespace clume::bench {
 namespace {
 
-constexpr std::uint32_t kGroups = 32, kLines = 4096;
+constexpr std::uint32_t kGroups = 32, kLines = 4096;  // times copies
 constexpr std::size_t kVertices = 12, kMeshFloats = kVertices * 3 * CLUME_GROUP_SIZE;
 
 /// A unit sphere's circumscribed icosahedron.
@@ -62,7 +62,7 @@ struct Data {
 };
 
 /// Ellipsoids in the unit ball sized for `overlap`, lines through it.
-Data make_data(const Icosahedron& proxy, double overlap) {
+Data make_data(const Icosahedron& proxy, double overlap, std::size_t copies) {
     Scene scene = reference::random_mixture(KernelFamily::gaussian, static_cast<int>(kGroups * CLUME_GROUP_SIZE), 3, overlap, 2);
     scene.render.strategy = "decomposition";
     RenderOptions options;
@@ -92,6 +92,8 @@ Data make_data(const Icosahedron& proxy, double overlap) {
         data.lines.push_back({r.origin[0], r.origin[1], r.origin[2], 0});
         data.lines.push_back({r.direction[0], r.direction[1], r.direction[2], 0});
     }
+    data.lines.reserve(2 * copies * kLines);
+    for (std::size_t i = 2 * kLines; i < 2 * copies * kLines; ++i) data.lines.push_back(data.lines[i - 2 * kLines]);
     return data;
 }
 
@@ -100,7 +102,7 @@ Data make_data(const Icosahedron& proxy, double overlap) {
 struct ProxyLines::Impl {
     Impl(const DeviceInfo& device, const ProgramOptions& options, const Icosahedron& proxy, const Data& data)
         : queue(device), kernel(make_kernel(queue, build_program(queue, "proxy.cl", options), "proxy_lines")),
-          groups(queue, data.groups), meshes(queue, data.meshes), faces(queue, proxy.faces), normals(queue, proxy.normals), lines(queue, data.lines), out(queue, kLines),
+          groups(queue, data.groups), meshes(queue, data.meshes), faces(queue, proxy.faces), normals(queue, proxy.normals), lines(queue, data.lines), out(queue, data.lines.size() / 2),
           e2(data.e2), reach(data.reach) {}
     Queue queue;
     cl::Kernel kernel;
@@ -110,20 +112,20 @@ struct ProxyLines::Impl {
     float e2, reach;
 };
 
-ProxyLines::ProxyLines(const DeviceInfo& device, int width, double overlap) {
+ProxyLines::ProxyLines(const DeviceInfo& device, int width, double overlap, std::size_t copies) {
     const Icosahedron proxy;
     ProgramOptions options;
     options.define("CLUME_WIDTH", width);
-    impl_ = std::make_unique<Impl>(device, options, proxy, make_data(proxy, overlap));
+    impl_ = std::make_unique<Impl>(device, options, proxy, make_data(proxy, overlap, copies));
 }
 ProxyLines::~ProxyLines() = default;
 
-double ProxyLines::tests() const { return static_cast<double>(kLines) * kGroups * CLUME_GROUP_SIZE; }
+double ProxyLines::tests() const { return static_cast<double>(impl_->out.size()) * kGroups * CLUME_GROUP_SIZE; }
 
 double ProxyLines::launch(ProxyWork what) {
     Impl& s = *impl_;
-    set_args(s.queue, s.kernel, 0, s.groups, s.meshes, s.faces, s.normals, s.lines, s.out, s.reach, cl_uint(kLines), cl_uint(kGroups), s.e2, cl_uint(what));
-    return s.queue.launch(s.kernel, kLines, s.queue.info().group_size());
+    set_args(s.queue, s.kernel, 0, s.groups, s.meshes, s.faces, s.normals, s.lines, s.out, s.reach, cl_uint(s.out.size()), cl_uint(kGroups), s.e2, cl_uint(what));
+    return s.queue.launch(s.kernel, s.out.size(), s.queue.info().group_size());
 }
 
 std::vector<device::float4> ProxyLines::out() const { return impl_->out.download(); }

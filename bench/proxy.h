@@ -15,7 +15,7 @@ enum class ProxyWork : std::uint32_t { analytic, mesh, instanced, check };
 class ProxyLines {
 public:
     /// Ellipsoids in the unit ball, sized so that about `overlap` supports cover a point of it.
-    ProxyLines(const DeviceInfo& device, int width, double overlap);
+    ProxyLines(const DeviceInfo& device, int width, double overlap, std::size_t copies = 1);
     ~ProxyLines();
 
     double tests() const;          ///< lines × ellipsoids

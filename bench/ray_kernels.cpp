@@ -121,17 +121,25 @@ Cost count(Session& session, const Field& f, const std::vector<ProbeRay>& all, c
     return cost;
 }
 
-/// Rays of the set, as many as a launch can do in a quarter of a second, but no more than 2^14 or so. `run` gives seconds.
+/// Rays of the set, as many as a launch can do in a quarter of a second, but no more than 2^14 or so, on a GPU 2^20.
+/// `run` gives seconds.
 Rays make_rays(Session& session, Field& f, const std::string& from, cl_uint what, const std::function<double(const std::vector<ProbeRay>&)>& run) {
-    const auto make = [&](int stride) {
-        std::vector<ProbeRay> list = camera_rays(*f.probe, f.film.width, f.film.height, stride, 0);
-        return from == "coherent" ? list : from == "inside" ? inside_rays(f.device, list.size(), 1) : crossing_rays(f.device, list.size(), 2);
+    const auto make = [&](int stride, std::uint32_t sample = 0) {
+        std::vector<ProbeRay> list = camera_rays(*f.probe, f.film.width, f.film.height, stride, sample);
+        return from == "coherent" ? list : from == "inside" ? inside_rays(f.device, list.size(), 2 * sample + 1) : crossing_rays(f.device, list.size(), 2 * sample + 2);
     };
     int stride = 2;
     std::vector<ProbeRay> list = make(stride);
     const std::vector<ProbeRay> some = spread(list, 64);
     const double s = run(some) / static_cast<double>(some.size()), most_s = session.options().quick ? 0.05 : 0.25;
     while (s * static_cast<double>(list.size()) > most_s && list.size() > 256) list = make(++stride);
+    if (copies_to_fill(session) > 1) {
+        const double copies = std::min(static_cast<double>(copies_to_fill(session)), most_s / run(list));
+        for (std::uint32_t sample = 1; sample < copies; ++sample) {
+            const std::vector<ProbeRay> more = make(stride, sample);
+            list.insert(list.end(), more.begin(), more.end());
+        }
+    }
     return {list, count(session, f, list, what)};
 }
 
