@@ -45,6 +45,7 @@ public:
             memory_ = queue.allocate(byte_size(), CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, const_cast<T*>(data.data()));  // NOLINT(cppcoreguidelines-pro-type-const-cast): OpenCL has no other way
         }
     }
+    Buffer(const Queue& queue, const SharedArray<T>& data) : Buffer(queue, data.values()) {}
     Buffer(Buffer&&) noexcept = default;
     /// By exchange: what was held is released by a destructor, which a device that fails even then cannot make throw.
     Buffer& operator=(Buffer&& other) noexcept {  // NOLINT(bugprone-exception-escape): only nothing is released amid a swap

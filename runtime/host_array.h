@@ -6,7 +6,9 @@
 #include <sys/mman.h>
 
 #include <cstddef>
+#include <memory>
 #include <new>
+#include <utility>
 #include <vector>
 
 namespace clume {
@@ -38,5 +40,28 @@ private:
 
 template <class T>
 using HostArray = std::vector<T, PageAllocator<T>>;
+
+/// A HostArray that stays as it is: copies are the same one.
+template <class T>
+class SharedArray {
+public:
+    SharedArray() = default;
+    SharedArray(const SharedArray&) = default;
+    SharedArray& operator=(const SharedArray&) = default;  // no moves: there is always an array
+    ~SharedArray() = default;
+    SharedArray(HostArray<T>&& values) : values_(std::make_shared<const HostArray<T>>(std::move(values))) {}  // NOLINT(google-explicit-constructor): it is what becomes of one
+
+    const HostArray<T>& values() const { return *values_; }
+    std::size_t size() const { return values_->size(); }
+    bool empty() const { return values_->empty(); }
+    const T* data() const { return values_->data(); }
+    const T* begin() const { return data(); }
+    const T* end() const { return data() + size(); }
+    const T& operator[](std::size_t i) const { return data()[i]; }
+    const T& back() const { return values_->back(); }
+
+private:
+    std::shared_ptr<const HostArray<T>> values_ = std::make_shared<const HostArray<T>>();
+};
 
 }  // namespace clume

@@ -23,6 +23,7 @@ struct CellCosts {
     double null_share = 1;   ///< rays that sample by null collisions (0..1)
     double chord_share = 0;  ///< rays that visit every chord (decomposition, analytic transmittance)
     double density_share = 0;  ///< rays that sample by null collisions with the density of the cell looked up
+    bool operator==(const CellCosts&) const = default;
 };
 
 struct CellOptions {
@@ -31,6 +32,7 @@ struct CellOptions {
     std::optional<int> roots;            ///< root cells along the longest axis; default: by the costs
     bool control = false;                ///< fill Leaf::control
     std::size_t max_references = 0;      ///< kept to by larger cells, never by dropping a primitive
+    bool operator==(const CellOptions&) const = default;
 };
 
 struct Cells {

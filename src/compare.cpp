@@ -13,6 +13,7 @@
 #include "runtime/error.h"
 #include "src/compare_runner.h"
 #include "src/device_lights.h"
+#include "src/device_mixture.h"
 #include "src/error.h"
 
 namespace clume {
@@ -40,9 +41,11 @@ public:
 
     Comparison run() {
         describe();
+        options_.render.shared = std::make_shared<SharedStructures>();  // pairs differ in what they do with them
         prepare();
         if (!plan_.stopped()) pilots();
         if (!plan_.stopped() && !options_.reference) make_reference(scene_, options_, ready_, pilot_spp_, plan_, out_);
+        options_.render.shared.reset();
         if (!out_.reference.rgb.empty() && !out_.reference_refused()) seeds();
         out_.interrupted = plan_.stopped();
         check_reference();

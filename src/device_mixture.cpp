@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <fmt/format.h>
+#include <utility>
 
 #include "src/alias_table.h"
 #include "src/device_values.h"
@@ -17,7 +19,7 @@ namespace {
 /// Device groups out of lists of primitives: each list is cut by medium, then into sixteens.
 class GroupWriter {
 public:
-    GroupWriter(const std::vector<Ellipsoid>& ellipsoids, DeviceScene& out) : ellipsoids_(ellipsoids), out_(out) {}
+    GroupWriter(std::span<const Ellipsoid> ellipsoids, Groups& out) : ellipsoids_(ellipsoids), out_(out) {}
 
     /// Number of groups that a list (ascending, so by medium) takes.
     std::size_t count(const std::vector<std::uint32_t>& list) const {
@@ -28,18 +30,18 @@ public:
 
     /// Makes room for more groups; the index of the first.
     std::size_t extend(std::size_t groups) {
-        const std::size_t first = out_.group_medium.size();
+        const std::size_t first = out_.medium.size();
         require_memory("groups of primitives", {{"groups for the device", (first + groups) * (4 * CLUME_GROUP_FLOATS + sizeof(device::uint))}});
-        out_.group_medium.resize(first + groups);
-        out_.groups.resize((first + groups) * CLUME_GROUP_FLOATS);
+        out_.medium.resize(first + groups);
+        out_.rows.resize((first + groups) * CLUME_GROUP_FLOATS);
         return first;
     }
 
     void write(std::size_t group, const std::vector<std::uint32_t>& list) {
         for (std::size_t i = 0; i < list.size(); ++group) {
             const std::size_t n = length(list, i);
-            float* row = out_.groups.data() + group * CLUME_GROUP_FLOATS;
-            out_.group_medium[group] = ellipsoids_[list[i]].medium;
+            float* row = out_.rows.data() + group * CLUME_GROUP_FLOATS;
+            out_.medium[group] = ellipsoids_[list[i]].medium;
             for (std::size_t lane = 0; lane < CLUME_GROUP_SIZE; ++lane) {
                 const auto put = [&](int r, float v) { row[static_cast<std::size_t>(r) * CLUME_GROUP_SIZE + lane] = v; };
                 if (lane >= n) {
@@ -60,12 +62,12 @@ private:
         while (n < CLUME_GROUP_SIZE && i + n < list.size() && ellipsoids_[list[i + n]].medium == ellipsoids_[list[i]].medium) ++n;
         return n;
     }
-    const std::vector<Ellipsoid>& ellipsoids_;
-    DeviceScene& out_;
+    std::span<const Ellipsoid> ellipsoids_;
+    Groups& out_;
 };
 
 /// Alias table over the bounds of a cell, into references[first, first + n).
-void pack_references(const Cells::Leaf& leaf, const std::vector<Ellipsoid>& ellipsoids, device::Reference* out) {
+void pack_references(const Cells::Leaf& leaf, std::span<const Ellipsoid> ellipsoids, device::Reference* out) {
     const std::size_t n = leaf.primitives.size();
     // Upper half of peak / bound: exact but for the rounding of the quotient, since the bound was chosen for it.
     const auto scale = [&](std::size_t i) {
@@ -85,12 +87,12 @@ device::uint family_bit(KernelFamily k) {
     return k == KernelFamily::gaussian ? FAMILY_GAUSSIAN : k == KernelFamily::epanechnikov ? FAMILY_EPANECHNIKOV : FAMILY_UNIFORM;
 }
 
-void pack_primitives(DeviceScene& out) {
-    out.primitives.resize(out.ellipsoids.size());
-    parallel_chunks(out.ellipsoids.size(), 4096, [&](std::size_t begin, std::size_t end) {
+HostArray<device::Primitive> pack_primitives(std::span<const Ellipsoid> ellipsoids) {
+    HostArray<device::Primitive> primitives(ellipsoids.size());
+    parallel_chunks(ellipsoids.size(), 4096, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const Ellipsoid& e = out.ellipsoids[i];
-            device::Primitive& p = out.primitives[i];
+            const Ellipsoid& e = ellipsoids[i];
+            device::Primitive& p = primitives[i];
             p = {};
             for (int k = 0; k < 3; ++k) p.mu[k] = static_cast<float>(e.center[k]);
             for (int k = 0; k < 6; ++k) p.w[k] = static_cast<float>(e.w[k]);
@@ -100,6 +102,7 @@ void pack_primitives(DeviceScene& out) {
             p.medium = e.medium;
         }
     });
+    return primitives;
 }
 
 void pack_lane(const Ellipsoid& e, std::uint32_t id, float* lane, std::size_t stride) {
@@ -110,14 +113,14 @@ void pack_lane(const Ellipsoid& e, std::uint32_t id, float* lane, std::size_t st
     put(CLUME_ROW_ID, as_float(id));
 }
 
-void pack_cells(const Cells& cells, bool with_groups, bool with_references, DeviceScene& out) {
-    out.leaves.resize(cells.leaves.size());
-    GroupWriter writer(out.ellipsoids, out);
+PackedCells pack_cells(const Cells& cells, std::span<const Ellipsoid> ellipsoids, bool with_groups, bool with_references, Groups& out_groups) {
+    HostArray<device::CellLeaf> leaves(cells.leaves.size());
+    GroupWriter writer(ellipsoids, out_groups);
     std::size_t groups = 0, references = 0;
     std::vector<device::uint> first_reference(with_references ? cells.leaves.size() : 0);
     for (std::size_t i = 0; i < cells.leaves.size(); ++i) {
         const Cells::Leaf& leaf = cells.leaves[i];
-        device::CellLeaf& l = out.leaves[i];
+        device::CellLeaf& l = leaves[i];
         l = {};
         // Below the sum of the bounds also after both were rounded.
         l.control = static_cast<float>(std::min(leaf.control * (1 - 1e-5), leaf.majorant * 0.999));
@@ -131,48 +134,44 @@ void pack_cells(const Cells& cells, bool with_groups, bool with_references, Devi
             references += leaf.primitives.size();
         }
     }
-    require_memory("cells", {{"table for the device", cells.table.size() * sizeof(device::CellEntry)}, {"references", references * sizeof(device::Reference)}, {"primitives", out.ellipsoids.size() * sizeof(device::Primitive)}});
-    out.cells.resize(cells.table.size());
+    require_memory("cells", {{"table for the device", cells.table.size() * sizeof(device::CellEntry)}, {"references", references * sizeof(device::Reference)}, {"primitives", ellipsoids.size() * sizeof(device::Primitive)}});
+    HostArray<device::CellEntry> table(cells.table.size());
     for (std::size_t i = 0; i < cells.table.size(); ++i) {
         const device::uint link = cells.table[i];
-        out.cells[i] = {link, 0, 0, 0};
+        table[i] = {link, 0, 0, 0};
         if ((link & CELL_INNER) || link < CELL_EMPTY_MAX || !with_references) continue;
         const std::size_t leaf = link - CELL_EMPTY_MAX;
-        out.cells[i] = {link, static_cast<float>(cells.leaves[leaf].majorant), first_reference[leaf], static_cast<device::uint>(cells.leaves[leaf].primitives.size())};
+        table[i] = {link, static_cast<float>(cells.leaves[leaf].majorant), first_reference[leaf], static_cast<device::uint>(cells.leaves[leaf].primitives.size())};
     }
     if (std::max(groups, references) > 0x7fffffffu) throw RenderError("the cells need more than 2^31 references");
     writer.extend(groups);
-    out.references.resize(references);
+    HostArray<device::Reference> slots(references);
     parallel_chunks(cells.leaves.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            if (with_groups) writer.write(out.leaves[i].first_group, cells.leaves[i].primitives);
-            if (with_references) pack_references(cells.leaves[i], out.ellipsoids, out.references.data() + first_reference[i]);
+            if (with_groups) writer.write(leaves[i].first_group, cells.leaves[i].primitives);
+            if (with_references) pack_references(cells.leaves[i], ellipsoids, slots.data() + first_reference[i]);
         }
     });
-    if (with_references) pack_primitives(out);
-    device::RenderParams& p = out.params;
-    p.cells_origin = pack(cells.origin, 1.0 / cells.root_size);
-    p.cells_x = cells.roots.x;
-    p.cells_y = cells.roots.y;
-    p.cells_z = cells.roots.z;
-    p.cells_levels = cells.levels;
+    const std::size_t n = ellipsoids.size();
+    return {std::move(table), std::move(leaves), std::move(slots), pack(cells.origin, 1.0 / cells.root_size), cells.roots, cells.levels,
+            fmt::format("{}x{}x{} cells, {} octree levels, {} leaves, {:.1f} references per primitive", cells.roots.x, cells.roots.y, cells.roots.z, cells.levels, cells.leaves.size(),
+                        n ? static_cast<double>(cells.references) / static_cast<double>(n) : 0.0)};
 }
 
-std::uint32_t pack_bvh(const BvhTree& tree, DeviceScene& out) {
-    WideBvh wide = widen(tree, out.ellipsoids);
-    out.nodes = std::move(wide.nodes);
-    GroupWriter writer(out.ellipsoids, out);
+PackedBvh pack_bvh(const BvhTree& tree, std::span<const Ellipsoid> ellipsoids, Groups&& groups) {
+    WideBvh wide = widen(tree, ellipsoids);
+    GroupWriter writer(ellipsoids, groups);
     const std::size_t first = writer.extend(wide.groups.size());
     for (std::size_t g = 0; g < wide.groups.size(); ++g) writer.write(first + g, wide.groups[g]);
-    for (auto& node : out.nodes)
+    for (auto& node : wide.nodes)
         for (auto& child : node.child)
             if (child != BVH_NONE && (child & BVH_LEAF)) child += static_cast<device::uint>(first);
-    if (out.nodes.empty()) {
+    if (wide.nodes.empty()) {
         device::BvhNode none{};
         for (auto& c : none.child) c = BVH_NONE;
-        out.nodes.push_back(none);
+        wide.nodes.push_back(none);
     }
-    return wide.stack_entries;
+    return {std::move(wide.nodes), std::move(groups.rows), std::move(groups.medium), wide.stack_entries};
 }
 
 }  // namespace clume

@@ -22,10 +22,7 @@
 namespace clume {
 namespace {
 
-template <class T, class A>
-std::string hash_of(const std::vector<T, A>& v) {
-    return sha256_hex(std::as_bytes(std::span(v)));
-}
+std::string hash_of(const auto& array) { return sha256_hex(std::as_bytes(std::span(array))); }
 
 /// Uniform values and tables of what varies by primitive or medium; returns whether all of it is grey.
 struct MediaTraits {
@@ -116,7 +113,7 @@ MediaTraits pack_media(const Scene& scene, DeviceScene& out) {
 }
 
 /// Of the media's bounds as a whole: where `progressive` starts.
-float mean_extinction(const std::vector<Ellipsoid>& ellipsoids) {
+float mean_extinction(std::span<const Ellipsoid> ellipsoids) {
     const Box box = bounds_of(ellipsoids);
     const glm::dvec3 size = box.hi - box.lo;
     double mass = 0;
@@ -150,32 +147,60 @@ Structures structures_of(const DeviceScene& out, bool shadow_rays, bool lamps, c
     return w;
 }
 
-/// Builds what is wanted; says what it is.
-std::string build_structures(const Structures& wanted, const TreeSource& tree, std::optional<int> majorant_grid, bool kept_cells, DeviceScene& out) {
+/// Builds what is wanted and not yet shared; says what it is.
+std::string build_structures(const Structures& wanted, const TreeSource& tree, std::optional<int> majorant_grid, bool kept_cells, SharedStructures* shared, DeviceScene& out) {
     std::string text;
+    Groups groups;
     if (wanted.references || wanted.cell_groups) {
         const bool densities = wanted.scene_bound || out.strategy == "progressive";
-        const std::size_t n = out.ellipsoids.size();
         CellOptions o;
         o.costs.null_share = wanted.references ? 1 : 0;
         o.costs.density_share = densities ? 1 : 0;
         o.costs.chord_share = wanted.cell_groups && !densities ? 1 : 0;
         o.control = wanted.references && out.transmittance == "residual-ratio";
-        o.max_references = std::max<std::size_t>(std::size_t{2} << 20, 6 * n);
+        o.max_references = std::max<std::size_t>(std::size_t{2} << 20, 6 * out.ellipsoids.size());
         if (out.bound == "grid" && (wanted.references || densities)) {
             o.max_levels = 0;
             o.roots = majorant_grid;
         }
-        const Cells cells = cached_cells(out.ellipsoids, tree, o, kept_cells ? cells_folder() : std::filesystem::path());
-        pack_cells(cells, wanted.cell_groups, wanted.references, out);
-        text = fmt::format("{}x{}x{} cells, {} octree levels, {} leaves, {:.1f} references per primitive", cells.roots.x, cells.roots.y,
-                           cells.roots.z, cells.levels, cells.leaves.size(), n ? static_cast<double>(cells.references) / static_cast<double>(n) : 0.0);
+        const bool share = shared && !wanted.cell_groups && !o.control;  // one estimator alone needs control
+        PackedCells packed;
+        if (share && shared->cell_options == o) {
+            packed = shared->cells;
+        } else {
+            if (share) shared->cell_options.reset(), shared->cells = {};  // one at a time in memory
+            packed = pack_cells(cached_cells(out.ellipsoids, tree, o, kept_cells ? cells_folder() : std::filesystem::path()), out.ellipsoids, wanted.cell_groups, wanted.references, groups);
+            if (share) shared->cell_options = o, shared->cells = packed;
+        }
+        out.cells = packed.cells;
+        out.leaves = packed.leaves;
+        out.references = packed.references;
+        out.params.cells_origin = packed.origin;
+        out.params.cells_x = packed.roots.x;
+        out.params.cells_y = packed.roots.y;
+        out.params.cells_z = packed.roots.z;
+        out.params.cells_levels = packed.levels;
+        text = packed.text;
+    }
+    if (wanted.references) {
+        if (shared && !shared->primitives.empty()) out.primitives = shared->primitives;
+        else out.primitives = pack_primitives(out.ellipsoids);
+        if (shared) shared->primitives = out.primitives;
     }
     if (wanted.scene_bound) out.params.scene_bound = std::nextafter(static_cast<float>(std::max(scene_bound(out.ellipsoids, tree()), 1e-20)), 1e30f);
     if (out.strategy == "progressive") out.learned.assign(out.leaves.size(), mean_extinction(out.ellipsoids));
     if (wanted.bvh) {
-        out.bvh_stack = pack_bvh(tree(), out);
+        const bool share = shared && groups.medium.empty();
+        const PackedBvh packed = share && shared->bvh ? *shared->bvh : pack_bvh(tree(), out.ellipsoids, std::move(groups));
+        if (share) shared->bvh = packed;
+        out.nodes = packed.nodes;
+        out.groups = packed.groups;
+        out.group_medium = packed.group_medium;
+        out.bvh_stack = packed.stack;
         text += fmt::format("{}8-wide bvh, {} nodes", text.empty() ? "" : "; ", out.nodes.size());
+    } else {
+        out.groups = std::move(groups.rows);
+        out.group_medium = std::move(groups.medium);
     }
     if (!out.group_medium.empty()) text += fmt::format(", {} groups", out.group_medium.size());
     return text;
@@ -254,15 +279,23 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     const auto start = std::chrono::steady_clock::now();
     std::uint64_t primitives = 0;
     for (const auto& m : scene.media) primitives += m.primitives.size();
-    require_memory(scene.path, {{"primitives for the device", primitives * (sizeof(Ellipsoid) + sizeof(device::Primitive))}, {"tree over them", primitives * 2 * sizeof(BvhTree::Node)}});
-    out.ellipsoids = make_ellipsoids(scene, out.normalization);
-    std::optional<BvhTree> built;
+    SharedStructures* shared = options.shared.get();
+    if (shared && memory_in_use() > memory_limit() / 2) *shared = {};  // better built again than too much
+    if (shared && !shared->ellipsoids.empty()) {
+        out.ellipsoids = shared->ellipsoids;
+    } else {
+        require_memory(scene.path, {{"primitives for the device", primitives * (sizeof(Ellipsoid) + sizeof(device::Primitive))}, {"tree over them", primitives * 2 * sizeof(BvhTree::Node)}});
+        out.ellipsoids = make_ellipsoids(scene, out.normalization);
+    }
+    if (shared) shared->ellipsoids = out.ellipsoids;
+    std::optional<BvhTree> own;
+    std::optional<BvhTree>& built = shared ? shared->tree : own;
     const auto tree = [&]() -> const BvhTree& { return built ? *built : built.emplace(build_bvh(out.ellipsoids)); };
     const std::size_t lamps = with_structures && (lights.nee & (LIGHT_POINT | LIGHT_SPOT)) ? mark_lamps(scene, tree(), out) : 0;
     const Structures wanted = with_structures ? structures_of(out, lights.nee != 0, lamps > 0, options) : Structures{};
     std::string accelerator;
-    if (with_structures) accelerator = build_structures(wanted, tree, r.majorant_grid, options.kept_cells, out);
-    else pack_primitives(out);
+    if (with_structures) accelerator = build_structures(wanted, tree, r.majorant_grid, options.kept_cells, shared, out);
+    else out.primitives = pack_primitives(out.ellipsoids);
     const GridTraits voxels = pack_grids(scene, asked.bound, out);
     Box bounds = bounds_of(out.ellipsoids);
     if (lamps > 0)  // the mixture alone needs no more than its own

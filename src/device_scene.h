@@ -19,14 +19,14 @@ namespace clume {
 struct DeviceScene {
     Normalization normalization;
     device::RenderParams params{};
-    HostArray<device::CellEntry> cells;
-    HostArray<device::CellLeaf> leaves;
-    HostArray<device::Reference> references;
+    SharedArray<device::CellEntry> cells;
+    SharedArray<device::CellLeaf> leaves;
+    SharedArray<device::Reference> references;
     std::vector<float> learned;  ///< first bounds of `progressive`, per leaf
-    HostArray<device::Primitive> primitives;
-    HostArray<device::BvhNode> nodes;
-    HostArray<float> groups;
-    HostArray<device::uint> group_medium;
+    SharedArray<device::Primitive> primitives;
+    SharedArray<device::BvhNode> nodes;
+    SharedArray<float> groups;
+    SharedArray<device::uint> group_medium;
     std::vector<device::MediumInfo> media;
     HostArray<device::float4> shading;
     std::vector<device::LightInfo> lights;
@@ -41,7 +41,7 @@ struct DeviceScene {
     std::string strategy, transmittance, bound;                ///< what `auto` became
     bool lanes = false;                                        ///< a work-item follows as many paths as vectors are wide
     std::uint32_t bvh_stack = 0;                               ///< entries of a traversal's stack
-    std::vector<Ellipsoid> ellipsoids;
+    SharedArray<Ellipsoid> ellipsoids;
     std::vector<std::array<glm::dvec3, 8>> grid_boxes;         ///< per grid that holds anything: corners around it, world units
     double accelerator_s = 0;                                  ///< seconds to build it
 

@@ -45,14 +45,14 @@ glm::dvec3 apply_transposed(const double* w, const glm::dvec3& y) {
 
 }  // namespace
 
-std::vector<Ellipsoid> make_ellipsoids(const Scene& scene, const Normalization& n) {
+HostArray<Ellipsoid> make_ellipsoids(const Scene& scene, const Normalization& n) {
     std::vector<std::size_t> first;
     std::size_t count = 0;
     for (const auto& m : scene.media) {
         first.push_back(count);
         count += m.primitives.size();
     }
-    std::vector<Ellipsoid> out(count);
+    HostArray<Ellipsoid> out(count);
     for (std::size_t m = 0; m < scene.media.size(); ++m) {
         const auto& medium = scene.media[m];
         parallel_chunks(medium.primitives.size(), 4096, [&](std::size_t begin, std::size_t end) {

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "runtime/host_array.h"
 #include "src/scene.h"
 
 namespace clume {
@@ -42,7 +43,7 @@ inline constexpr double most_whitening = 1e18;
 
 /// Whitened, normalised primitives of all media, in file order, media one after the other. Throws SceneError where single
 /// precision can't hold one.
-std::vector<Ellipsoid> make_ellipsoids(const Scene& scene, const Normalization& n);
+HostArray<Ellipsoid> make_ellipsoids(const Scene& scene, const Normalization& n);
 
 /// The box of all dilated supports; empty media give lo > hi.
 Box bounds_of(std::span<const Ellipsoid> ellipsoids);

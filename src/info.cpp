@@ -35,14 +35,14 @@ double whitened2(const Ellipsoid& e, const glm::dvec3& p) {
 }
 
 /// How many supports hold p.
-std::size_t overlap_at(const std::vector<Ellipsoid>& ellipsoids, const BvhTree& tree, const glm::dvec3& p) {
+std::size_t overlap_at(std::span<const Ellipsoid> ellipsoids, const BvhTree& tree, const glm::dvec3& p) {
     std::size_t n = 0;
     tree.overlapping(ellipsoids, Box{p, p}, [&](std::uint32_t i) { n += whitened2(ellipsoids[i], p) < ellipsoids[i].extent * ellipsoids[i].extent; });
     return n;
 }
 
 /// ∫ σ_t along the line through the middle of the bounds, by composite Simpson on 20,000 steps.
-double depth_through_middle(const std::vector<Ellipsoid>& ellipsoids, const Box& bounds, int axis) {
+double depth_through_middle(std::span<const Ellipsoid> ellipsoids, const Box& bounds, int axis) {
     const glm::dvec3 middle = 0.5 * (bounds.lo + bounds.hi);
     constexpr int steps = 20000;
     double depth = 0;

@@ -145,16 +145,19 @@ int render_scene(const RenderCommand& command) {
                                      crop->x1, crop->y1, scene.film.width, scene.film.height));
     if (stop_requested()) return interrupted_early();
     const std::vector<DeviceInfo> known = list_devices();
-    const std::optional<Pilot> pilot = run_pilot(scene, command.options, pilot_folder(), stop_requested());
+    std::optional<Pilot> pilot = run_pilot(scene, command.options, pilot_folder(), stop_requested());
     if (stop_requested()) return interrupted_early();
     RenderOptions options = command.options;
-    if (pilot) options.pair = pilot->pair();
+    if (pilot) {
+        options.pair = pilot->pair();
+        options.shared = std::move(pilot->structures);
+    }
     if (pilot && pilot->cut_short) say(pilot->summary());
     if (command.explain) print_explanation(scene, options, pilot);
 
     ProgressReporter progress(command.quiet, command.options.time_limit_s);
     RenderResult result = render(
-        scene, options, [&](const Progress& p) { progress.update(p); }, stop_requested());
+        scene, std::move(options), [&](const Progress& p) { progress.update(p); }, stop_requested());
     progress.finish();
     RenderStats& stats = result.stats;
     if (pilot) {

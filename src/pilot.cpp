@@ -12,6 +12,7 @@
 #include "runtime/hash.h"
 #include "runtime/disk_cache.h"
 #include "src/device_lights.h"
+#include "src/device_mixture.h"
 #include "src/device_renderer.h"
 #include "src/device_scene.h"
 #include "src/error.h"
@@ -216,8 +217,10 @@ std::optional<Pilot> run_pilot(const Scene& scene, const RenderOptions& options,
     if (!folder.empty())
         if (const auto bytes = load_binary(folder, key))
             if (auto pilot = from_text(std::string(bytes->begin(), bytes->end()))) return pilot;
+    one.shared = std::make_shared<SharedStructures>();
     Pilot pilot = measure_all(scene, one, all_gpus(devices) ? "binary" : "analytic", {stop, options.time_limit_s});
     if (pilot.rows.empty()) return std::nullopt;
+    pilot.structures = std::move(one.shared);
     const bool complete = !pilot.cut_short && std::all_of(pilot.rows.begin(), pilot.rows.end(), [](const PilotRow& r) { return r.error.empty(); });
     if (!folder.empty() && complete) {
         const std::string text = to_text(pilot);

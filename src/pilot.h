@@ -38,6 +38,7 @@ struct Pilot {
     std::vector<PilotRow> rows;  ///< in the order measured
     std::size_t chosen = 0;
     std::uint32_t pixels = 0, spp = 0;
+    std::shared_ptr<SharedStructures> structures;  ///< that it has built, for the render that follows; none if it was kept
     bool cut_short = false;  ///< it took as long as the whole render may: chosen is the best so far, or delta
 
     const MethodPair& pair() const { return rows[chosen].pair; }

@@ -178,6 +178,7 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     impl_->window = o.crop.value_or(CropWindow{0, 0, scene.film.width, scene.film.height});
 
     const auto packed = std::make_shared<DeviceScene>(make_device_scene(scene, o));
+    impl_->options.shared.reset();
     const DeviceScene& device = *packed;
     RenderStats& stats = impl_->setup;
     stats.strategy = device.strategy;
@@ -185,14 +186,14 @@ Renderer::Renderer(const Scene& scene, RenderOptions options) : impl_(std::make_
     stats.bound = device.bound;
     stats.primitives = device.ellipsoids.size();
     stats.device_bytes = device.byte_size();
-    stats.layout_hash = device.hash();
+    if (o.most_pixels == 0) stats.layout_hash = device.hash();
     stats.explain = device.explain;
     stats.build_s = device.accelerator_s;
     check_memory(scene, device, devices);
     require_memory(scene.path, {{"image", impl_->all_pixels() * image_bytes}});
 
     impl_->pixels = active_pixels(scene, device, impl_->window);
-    packed->ellipsoids = std::vector<Ellipsoid>();  // 152 bytes a primitive that nobody needs from here on
+    packed->ellipsoids = {};  // 152 bytes a primitive that nobody needs from here on
     if (const std::size_t n = impl_->pixels.size(); o.most_pixels > 0 && n > o.most_pixels) {
         std::vector<device::uint> some;
         for (std::size_t i = 0; i < o.most_pixels; ++i) some.push_back(impl_->pixels[i * n / o.most_pixels]);
@@ -286,11 +287,13 @@ RenderResult Renderer::result(const Accumulation& accumulation) const {
     return result;
 }
 
-RenderResult render(const Scene& scene, const RenderOptions& options, const std::function<void(const Progress&)>& progress,
+RenderResult render(const Scene& scene, RenderOptions options, const std::function<void(const Progress&)>& progress,
                     const std::atomic<bool>& stop) {
-    Renderer renderer(scene, options);
-    Accumulation film = renderer.start(scene.render.seed, options.sample_begin);
-    renderer.extend(film, options.sample_end ? options.sample_end : scene.render.spp, {progress, &stop, options.time_limit_s});
+    const std::uint32_t begin = options.sample_begin, end = options.sample_end ? options.sample_end : scene.render.spp;
+    const std::optional<double> limit_s = options.time_limit_s;
+    Renderer renderer(scene, std::move(options));
+    Accumulation film = renderer.start(scene.render.seed, begin);
+    renderer.extend(film, end, {progress, &stop, limit_s});
     return renderer.result(film);
 }
 

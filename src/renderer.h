@@ -30,6 +30,8 @@ inline constexpr std::array<const char*, WORK_KINDS> work_names = {"cells", "nod
 /// Nanoseconds that an operation of each kind costs.
 using WorkWeights = std::array<double, WORK_KINDS>;
 
+struct SharedStructures;
+
 struct WorkLimit {
     double ns = 0;  ///< 0: none
     WorkWeights weights{};
@@ -45,6 +47,7 @@ struct RenderOptions {
     std::optional<double> time_limit_s;        ///< stop handing out batches after this long; the image holds what was done
     std::optional<double> noise_threshold;     ///< > 0: a tile of the film gets the samples it needs for that relative error (src/adaptive.h), no more
     std::uint32_t batch_samples = 0;           ///< samples of a pixel per batch; 0: sized to 100–200 ms by measurement
+    std::shared_ptr<SharedStructures> shared;  ///< of several renderers of one scene (src/device_mixture.h): what one has built, the next one uses; a renderer lets go of it once it is made
     std::optional<MethodPair> pair;            ///< instead of the scene's own strategy, transmittance and bound
     int vector_width = 0;                      ///< 16, 8, 4, 1; 0: the device's own
     std::uint32_t most_pixels = 0;             ///< > 0: a pilot: at most so many of the pixels that meet something, by a program that is sooner built
@@ -180,7 +183,7 @@ private:
 };
 
 /// One run of a Renderer made for it, with the scene's seed. Throws what its functions throw.
-RenderResult render(const Scene& scene, const RenderOptions& options, const std::function<void(const Progress&)>& progress,
+RenderResult render(const Scene& scene, RenderOptions options, const std::function<void(const Progress&)>& progress,
                     const std::atomic<bool>& stop);
 
 /// What `--explain` prints without rendering.

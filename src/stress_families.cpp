@@ -176,7 +176,7 @@ std::vector<ChordCase> chord_cases(const ChordFamily& f, KernelFamily kernel, st
             p.sigma_t *= n.scale;
             medium.primitives.push_back(p);
         }
-        const std::vector<Ellipsoid> ellipsoids = make_ellipsoids(scene, normalize(scene));
+        const HostArray<Ellipsoid> ellipsoids = make_ellipsoids(scene, normalize(scene));
         for (std::size_t i = first; i < cases.size(); ++i) {
             const Ellipsoid& e = ellipsoids[i - first + 2];
             ChordCase& c = cases[i];

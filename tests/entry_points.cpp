@@ -133,7 +133,7 @@ Outputs run_building_blocks(const DeviceInfo& device, int width, std::size_t cou
     keep(out, "probe_lamp", probe.lamp_places(views, places));
 
     // A group of overlapping ellipsoids for each ray.
-    const HostArray<float> groups = packed(everything(false), {"decomposition", "analytic", "auto", "newton", "bvh"}).groups;
+    const SharedArray<float> groups = packed(everything(false), {"decomposition", "analytic", "auto", "newton", "bvh"}).groups;
     std::vector<float> in;
     std::vector<ProbeGroupRay> rays;
     for (const ProbeRay& r : random_rays(count, 9, 0.5)) {
@@ -228,7 +228,7 @@ Outputs run_bench_kernels(const DeviceInfo& device, int width) {
     run(peaks, "peak_gather", result, in, result, count, cl_uint(127), rounds, cl_uint(1));
     run(peaks, "peak_nothing", result, result, count);
 
-    const HostArray<float>& groups = packed(everything(false), {"decomposition", "analytic", "auto", "newton", "bvh"}).groups;
+    const SharedArray<float> groups = packed(everything(false), {"decomposition", "analytic", "auto", "newton", "bvh"}).groups;
     const Buffer<float> group(queue, groups);
     const cl::Program proxy = build_program(queue, "proxy.cl", general);
     for (cl_uint what = 0; what < 4; ++what) run(proxy, "proxy_lines", sums, group, in, faces, in, rays, sums, 2.5f, count, cl_uint(1), 6.25f, what);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -63,7 +64,7 @@ struct FlightLaw {
     std::vector<std::vector<double>> by_primitive;  ///< [primitive hit][bin]
     std::vector<double> by_bin;                ///< bins, then the escape mass
 
-    FlightLaw(const std::vector<Ellipsoid>& ellipsoids, const ProbeRay& ray, std::size_t bin_count) : bins(bin_count), by_bin(bin_count + 1) {
+    FlightLaw(std::span<const Ellipsoid> ellipsoids, const ProbeRay& ray, std::size_t bin_count) : bins(bin_count), by_bin(bin_count + 1) {
         std::vector<LinePrimitive> line;
         for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
             const LinePrimitive p(ellipsoids[i], ray);
@@ -148,20 +149,20 @@ inline DeviceScene fine_cells(const Scene& scene, double step_cost = 0.5) {
     options.costs.step = step_cost;
     options.max_references = std::size_t{1} << 20;
     const Cells cells = build_cells(out.ellipsoids, build_bvh(out.ellipsoids), options);
-    out.cells.clear();
-    for (const std::uint32_t link : cells.table) out.cells.push_back({link, 0, 0, 0});
-    out.leaves.clear();
-    out.groups.clear();
-    out.group_medium.clear();
+    HostArray<device::CellEntry> table;
+    for (const std::uint32_t link : cells.table) table.push_back({link, 0, 0, 0});
+    HostArray<device::CellLeaf> leaves;
+    HostArray<float> groups;
+    HostArray<device::uint> group_medium;
     for (const Cells::Leaf& leaf : cells.leaves) {
-        const auto first = static_cast<device::uint>(out.group_medium.size());
+        const auto first = static_cast<device::uint>(group_medium.size());
         for (std::size_t i = 0; i < leaf.primitives.size();) {
-            const std::size_t base = out.groups.size();
-            out.groups.resize(base + CLUME_GROUP_FLOATS);
+            const std::size_t base = groups.size();
+            groups.resize(base + CLUME_GROUP_FLOATS);
             const std::uint32_t medium = out.ellipsoids[leaf.primitives[i]].medium;
-            out.group_medium.push_back(medium);
+            group_medium.push_back(medium);
             for (std::size_t lane = 0; lane < CLUME_GROUP_SIZE; ++lane) {
-                float* row = out.groups.data() + base + lane;
+                float* row = groups.data() + base + lane;
                 const bool used = i < leaf.primitives.size() && out.ellipsoids[leaf.primitives[i]].medium == medium;
                 const float nothing[] = {1e6f, 2e6f, 3e6f, 1, 0, 0, 1, 0, 1, 0, from_bits(CLUME_NO_PRIMITIVE)};
                 for (std::size_t r = 0; r < CLUME_GROUP_ROWS; ++r) row[16 * r] = nothing[r];
@@ -176,9 +177,13 @@ inline DeviceScene fine_cells(const Scene& scene, double step_cost = 0.5) {
         }
         device::CellLeaf packed{};
         packed.first_group = first;
-        packed.group_count = static_cast<device::uint>(out.group_medium.size()) - first;
-        out.leaves.push_back(packed);
+        packed.group_count = static_cast<device::uint>(group_medium.size()) - first;
+        leaves.push_back(packed);
     }
+    out.cells = std::move(table);
+    out.leaves = std::move(leaves);
+    out.groups = std::move(groups);
+    out.group_medium = std::move(group_medium);
     device::RenderParams& p = out.params;
     p.cells_origin = {static_cast<float>(cells.origin.x), static_cast<float>(cells.origin.y), static_cast<float>(cells.origin.z), static_cast<float>(1 / cells.root_size)};
     p.cells_x = cells.roots.x;
@@ -267,7 +272,7 @@ inline FlightP flight_p(Probe& probe, const FlightLaw& law, const ProbeRay& r, s
             (observed[law.bins] - n * escape) / std::sqrt(std::max(n * escape * (1 - escape), 1.0))};
 }
 
-inline FlightP flight_p(Probe& probe, const std::vector<Ellipsoid>& ellipsoids, const ProbeRay& r, std::size_t count, std::uint32_t sample, bool with_winner = true) {
+inline FlightP flight_p(Probe& probe, std::span<const Ellipsoid> ellipsoids, const ProbeRay& r, std::size_t count, std::uint32_t sample, bool with_winner = true) {
     return flight_p(probe, FlightLaw(ellipsoids, r, 24), r, count, sample, with_winner);
 }
 

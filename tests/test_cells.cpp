@@ -20,11 +20,11 @@ using namespace clume::probing;
 
 struct Built {
     std::string name;
-    std::vector<Ellipsoid> ellipsoids;
+    HostArray<Ellipsoid> ellipsoids;
     Cells cells;
 };
 
-Cells build(const std::vector<Ellipsoid>& e, bool chords) {
+Cells build(const HostArray<Ellipsoid>& e, bool chords) {
     CellOptions options;
     options.costs.null_share = chords ? 0 : 1;
     options.costs.chord_share = chords ? 1 : 0;
@@ -323,7 +323,7 @@ TEST_CASE("Cells.AreKept", "[quick]") {
     CHECK(ask(finer) == other);
     CHECK(files() == 2);
     // A scene that differs in one bit is another.
-    std::vector<Ellipsoid> moved = scene.ellipsoids;
+    HostArray<Ellipsoid> moved = scene.ellipsoids.values();
     moved[3].center.x = std::nextafter(moved[3].center.x, 9.0);
     (void)cached_cells(moved, count_tree, options, folder.path(), 0);
     CHECK(files() == 3);

@@ -245,7 +245,9 @@ TEST_CASE("Film.TooLowABoundIsCounted") {
     const Scene scene = grey_mixture();
     DeviceScene device = make_device_scene(scene, {});
     CHECK(render_device(scene, device, 16).violations == 0);
-    for (device::Reference& r : device.references) r.scales += 0x00800080u;  // both twice as large
+    HostArray<device::Reference> references = device.references.values();
+    for (device::Reference& r : references) r.scales += 0x00800080u;  // both twice as large
+    device.references = std::move(references);
     CHECK(render_device(scene, device, 16).violations > 100);
 }
 

@@ -46,7 +46,7 @@ std::array<Tally, 2> tally(double ratio, std::uint64_t seed) {
     std::array<Tally, 2> result;
     for (const bool quadratic : {false, true}) {
         std::vector<float> groups(kRays * CLUME_GROUP_FLOATS, 1.0f);
-        std::vector<Ellipsoid> truth = ellipsoids;
+        HostArray<Ellipsoid> truth = ellipsoids;
         for (std::size_t i = 0; i < kRays; ++i) {
             float* row = groups.data() + i * CLUME_GROUP_FLOATS;
             const double* w = ellipsoids[i].w;

@@ -5,8 +5,10 @@
 #include <numbers>
 #include <random>
 
+#include "src/device_mixture.h"
 #include "tests/device_image.h"
 #include "tests/image_test.h"
+#include "tests/pairs.h"
 #include "tests/reference/analytic_scenes.h"
 
 using namespace clume;
@@ -73,6 +75,28 @@ Camera random_camera(std::mt19937_64& engine) {
 }
 
 }  // namespace
+
+TEST_CASE("Specialisation.SharedStructuresAreTheSame") {
+    Scene scene = mixed_grid_scene();
+    scene.lights.push_back(lamp);
+    RenderOptions sharing;
+    sharing.shared = std::make_shared<SharedStructures>();
+    const float* groups = nullptr;
+    for (const MethodPair& pair : {MethodPair{"decomposition", "analytic"}, {"delta", "analytic", "grid"}, {"delta", "analytic", "tree"}, {"delta", "residual-ratio", "tree"}, {"regular", "binary"},
+                                   {"delta", "ratio", "scene"}, {"march", "march"}, {"progressive", "analytic"}, {"delta", "binary", "tree"}, {"decomposition", "ratio", "tree"}}) {
+        INFO(pair.label());
+        RenderOptions own;
+        own.pair = sharing.pair = pair;
+        const DeviceScene alone = make_device_scene(scene, own), shared = make_device_scene(scene, sharing);
+        CHECK(shared.hash() == alone.hash());
+        CHECK(shared.defines == alone.defines);
+        CHECK(shared.explain == alone.explain);
+        CHECK(shared.bvh_stack == alone.bvh_stack);
+        CHECK(shared.learned == alone.learned);
+        if (pair.strategy == "decomposition" && !groups) groups = shared.groups.data();
+        if (pair.strategy == "regular" || pair.label() == "delta:tree/analytic") CHECK(shared.groups.data() == groups);
+    }
+}
 
 TEST_CASE("Explain.SaysWhatIsLeftOut", "[quick]") {
     Scene scene = grey_mixture();

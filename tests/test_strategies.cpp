@@ -4,6 +4,7 @@
 // lists longer than what is held on the chip. Šidák over all tests of a case.
 #include <fmt/format.h>
 #include <numeric>
+#include <span>
 
 #include "tests/flight_reference.h"
 
@@ -44,7 +45,7 @@ DeviceScene packed_scene(Scene scene, const Pair& pair) {
     return share_program(make_device_scene(scene, {}));
 }
 
-double extinction_at(const std::vector<Ellipsoid>& all, const glm::dvec3& x) {
+double extinction_at(std::span<const Ellipsoid> all, const glm::dvec3& x) {
     double sum = 0;
     for (const Ellipsoid& e : all) {
         const glm::dvec3 p = x - e.center;
@@ -56,7 +57,7 @@ double extinction_at(const std::vector<Ellipsoid>& all, const glm::dvec3& x) {
 }
 
 /// The highest extinction in a box: random starts and centres, then a shrinking random walk from the best of them.
-double highest_extinction(const std::vector<Ellipsoid>& all, const Box& box, TestRandom& random) {
+double highest_extinction(std::span<const Ellipsoid> all, const Box& box, TestRandom& random) {
     const glm::dvec3 size = box.hi - box.lo;
     std::vector<std::pair<double, glm::dvec3>> starts;
     const auto add = [&](const glm::dvec3& x) { starts.emplace_back(extinction_at(all, x), x); };

@@ -2,6 +2,7 @@
 // Analytic transmittance on the device: exp(−Σ τ) against 50 digits, the same bits for both accelerators and every width,
 // nothing lost at any overlap, the order of primitives immaterial.
 #include <fmt/format.h>
+#include <span>
 
 #include "tests/flight_reference.h"
 #include "tests/reference/high_precision.h"
@@ -13,7 +14,7 @@ using namespace clume::probing;
 using reference::high::Real;
 
 /// Σ τ over all primitives, as the device's floats have them.
-double exact_depth(const std::vector<Ellipsoid>& ellipsoids, const ProbeRay& r) {
+double exact_depth(std::span<const Ellipsoid> ellipsoids, const ProbeRay& r) {
     Real sum = 0;
     const auto d = [](float v) { return static_cast<double>(v); };
     for (const Ellipsoid& e : ellipsoids) {
