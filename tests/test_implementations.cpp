@@ -171,6 +171,9 @@ TEST_CASE("EntryPoints.AreAllRun", "[.][entry]") {
     for (const int width : {1, 4}) all.merge(run_bench_kernels(device, width));
     for (const MethodCase& c : method_cases()) all.merge(run_method(device, 4, scene_of(c), c.pair, 8));
     for (const int width : {1, 4}) all.merge(run_method(device, width, hardly_anything(), {"delta", "analytic", "auto", "newton", "auto", width == 4 ? "sobol" : "independent"}, 8));
+    Scene sunny = hardly_anything();
+    sunny.lights = {sunlight()};
+    for (const char* estimator : {"analytic", "binary"}) all.merge(run_method(device, 1, sunny, {"delta", estimator, "tree"}, 0));  // shadow rays beside neighbours' flights
     std::size_t kernels = 0;
     for (const EmbeddedFile& file : embedded_kernels()) {
         const std::string text(file.text);
