@@ -55,7 +55,7 @@ Data make_data(KernelFamily family, std::size_t copies) {
     }
     std::mt19937_64 engine(5);
     std::uniform_real_distribution<float> u(0, 1);
-    for (const ProbeRay& r : inside_rays(device, kRays, 4)) {
+    for (const ProbeRay& r : inside_rays(device, copies * kRays, 4)) {
         ProbeGroupRay g;
         for (int k = 0; k < 3; ++k) {
             g.origin[k] = r.origin[k];
@@ -65,8 +65,6 @@ Data make_data(KernelFamily family, std::size_t copies) {
         g.tau = -std::log(1 - u(engine));
         data.rays.push_back(g);
     }
-    data.rays.reserve(copies * kRays);
-    for (std::size_t i = kRays; i < copies * kRays; ++i) data.rays.push_back(data.rays[i - kRays]);
     return data;
 }
 

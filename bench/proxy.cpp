@@ -88,12 +88,10 @@ Data make_data(const Icosahedron& proxy, double overlap, std::size_t copies) {
             for (int k = 0; k < 3; ++k) data.meshes[group * kMeshFloats + (3 * v + static_cast<std::size_t>(k)) * CLUME_GROUP_SIZE + lane] = static_cast<float>(at[k]);
         }
     }
-    for (const ProbeRay& r : inside_rays(device, kLines, 4)) {
+    for (const ProbeRay& r : inside_rays(device, copies * kLines, 4)) {
         data.lines.push_back({r.origin[0], r.origin[1], r.origin[2], 0});
         data.lines.push_back({r.direction[0], r.direction[1], r.direction[2], 0});
     }
-    data.lines.reserve(2 * copies * kLines);
-    for (std::size_t i = 2 * kLines; i < 2 * copies * kLines; ++i) data.lines.push_back(data.lines[i - 2 * kLines]);
     return data;
 }
 

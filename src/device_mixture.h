@@ -40,7 +40,7 @@ struct PackedCells {
     std::string text;             ///< what they are
 };
 
-/// `with_groups`: for what visits chords or looks densities up by cell, after the groups that are there; `with_references`: for
+/// `with_groups`: for what visits chords or looks densities up by cell, into `groups`, which are empty; `with_references`: for
 /// null collisions under the cells' bounds. Throws RenderError if there are too many.
 PackedCells pack_cells(const Cells& cells, std::span<const Ellipsoid> ellipsoids, bool with_groups, bool with_references, Groups& groups);
 

@@ -147,8 +147,8 @@ Structures structures_of(const DeviceScene& out, bool shadow_rays, bool lamps, c
     return w;
 }
 
-/// Builds what is wanted and not yet shared; says what it is.
-std::string build_structures(const Structures& wanted, const TreeSource& tree, std::optional<int> majorant_grid, bool kept_cells, SharedStructures* shared, DeviceScene& out) {
+/// Takes what is wanted from `shared`, where it is built first unless it is there; says what it is.
+std::string build_structures(const Structures& wanted, const TreeSource& tree, std::optional<int> majorant_grid, bool kept_cells, SharedStructures& shared, DeviceScene& out) {
     std::string text;
     Groups groups;
     if (wanted.references || wanted.cell_groups) {
@@ -163,14 +163,14 @@ std::string build_structures(const Structures& wanted, const TreeSource& tree, s
             o.max_levels = 0;
             o.roots = majorant_grid;
         }
-        const bool share = shared && !wanted.cell_groups && !o.control;  // one estimator alone needs control
+        const bool share = !wanted.cell_groups && !o.control;  // one estimator alone needs control
         PackedCells packed;
-        if (share && shared->cell_options == o) {
-            packed = shared->cells;
+        if (share && shared.cell_options == o) {
+            packed = shared.cells;
         } else {
-            if (share) shared->cell_options.reset(), shared->cells = {};  // one at a time in memory
+            if (share) shared.cell_options.reset(), shared.cells = {};  // one at a time in memory
             packed = pack_cells(cached_cells(out.ellipsoids, tree, o, kept_cells ? cells_folder() : std::filesystem::path()), out.ellipsoids, wanted.cell_groups, wanted.references, groups);
-            if (share) shared->cell_options = o, shared->cells = packed;
+            if (share) shared.cell_options = o, shared.cells = packed;
         }
         out.cells = packed.cells;
         out.leaves = packed.leaves;
@@ -183,16 +183,15 @@ std::string build_structures(const Structures& wanted, const TreeSource& tree, s
         text = packed.text;
     }
     if (wanted.references) {
-        if (shared && !shared->primitives.empty()) out.primitives = shared->primitives;
-        else out.primitives = pack_primitives(out.ellipsoids);
-        if (shared) shared->primitives = out.primitives;
+        if (shared.primitives.empty()) shared.primitives = pack_primitives(out.ellipsoids);
+        out.primitives = shared.primitives;
     }
     if (wanted.scene_bound) out.params.scene_bound = std::nextafter(static_cast<float>(std::max(scene_bound(out.ellipsoids, tree()), 1e-20)), 1e30f);
     if (out.strategy == "progressive") out.learned.assign(out.leaves.size(), mean_extinction(out.ellipsoids));
     if (wanted.bvh) {
-        const bool share = shared && groups.medium.empty();
-        const PackedBvh packed = share && shared->bvh ? *shared->bvh : pack_bvh(tree(), out.ellipsoids, std::move(groups));
-        if (share) shared->bvh = packed;
+        const bool share = groups.medium.empty();
+        const PackedBvh packed = share && shared.bvh ? *shared.bvh : pack_bvh(tree(), out.ellipsoids, std::move(groups));
+        if (share) shared.bvh = packed;
         out.nodes = packed.nodes;
         out.groups = packed.groups;
         out.group_medium = packed.group_medium;
@@ -279,18 +278,15 @@ static DeviceScene pack_scene(const Scene& scene, const RenderOptions& options, 
     const auto start = std::chrono::steady_clock::now();
     std::uint64_t primitives = 0;
     for (const auto& m : scene.media) primitives += m.primitives.size();
-    SharedStructures* shared = options.shared.get();
-    if (shared && memory_in_use() > memory_limit() / 2) *shared = {};  // better built again than too much
-    if (shared && !shared->ellipsoids.empty()) {
-        out.ellipsoids = shared->ellipsoids;
-    } else {
+    SharedStructures own;
+    SharedStructures& shared = options.shared ? *options.shared : own;
+    if (memory_in_use() > memory_limit() / 2) shared = {};  // better built again than too much
+    if (shared.ellipsoids.empty()) {
         require_memory(scene.path, {{"primitives for the device", primitives * (sizeof(Ellipsoid) + sizeof(device::Primitive))}, {"tree over them", primitives * 2 * sizeof(BvhTree::Node)}});
-        out.ellipsoids = make_ellipsoids(scene, out.normalization);
+        shared.ellipsoids = make_ellipsoids(scene, out.normalization);
     }
-    if (shared) shared->ellipsoids = out.ellipsoids;
-    std::optional<BvhTree> own;
-    std::optional<BvhTree>& built = shared ? shared->tree : own;
-    const auto tree = [&]() -> const BvhTree& { return built ? *built : built.emplace(build_bvh(out.ellipsoids)); };
+    out.ellipsoids = shared.ellipsoids;
+    const auto tree = [&]() -> const BvhTree& { return shared.tree ? *shared.tree : shared.tree.emplace(build_bvh(out.ellipsoids)); };
     const std::size_t lamps = with_structures && (lights.nee & (LIGHT_POINT | LIGHT_SPOT)) ? mark_lamps(scene, tree(), out) : 0;
     const Structures wanted = with_structures ? structures_of(out, lights.nee != 0, lamps > 0, options) : Structures{};
     std::string accelerator;
